@@ -1,0 +1,98 @@
+"""What a method is given and what it returns: the one interface of the harness."""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from matbench.scene import Scene
+from matbench.space import Volume
+
+
+@frozen(eq=False)
+class Estimate:
+    """What a method returns.
+
+    Parameters
+    ----------
+    disparity
+        View index -> (H, W) float32, pixels per view step, NaN where the method has no answer.
+        The reference view must be among them.
+    volume
+        Materialities or occupancies, if the method has them; visibilities follow from them.
+    history
+        Name -> one number per pass, such as energies.
+    work
+        Name -> exact count, the same on every machine: passes, point updates, ...
+    """
+
+    disparity: Mapping[int, NDArray[np.float32]]
+    volume: Volume | None = None
+    history: Mapping[str, Sequence[float]] = field(factory=dict)
+    work: Mapping[str, int] = field(factory=dict)
+
+
+class Probe:
+    """What a method tells while it works. This one listens to nothing; a recording does.
+
+    Ask `active` before preparing anything costly: recorded solves are never timed.
+    """
+
+    active: bool = False
+
+    def volume(self, name: str, volume: Volume) -> None:
+        """A volume worth looking at, such as ``similarity/0-1`` (pair of view indices)."""
+
+    def iteration(
+        self,
+        step: int,
+        energies: Mapping[str, float],
+        volume: Volume | None = None,
+        derivative: Volume | None = None,
+        disparity: NDArray[np.float32] | None = None,
+    ) -> None:
+        """The state after pass `step`: energies, volume, dE/dmu and the reference view's map.
+
+        `derivative` holds any real numbers, not only those in [0, 1].
+        """
+
+
+@frozen
+class Context:
+    """How to solve: everything that is neither the scene nor a parameter of the method.
+
+    Parameters
+    ----------
+    seed
+        For every random choice; the same seed must give the same estimate.
+    threads
+        How many threads to use; the estimate must not depend on it.
+    probe
+        Where to tell what happens.
+    """
+
+    seed: int = 0
+    threads: int = 1
+    probe: Probe = field(factory=Probe)
+
+
+@runtime_checkable
+class Algorithm(Protocol):
+    """A method: an attrs class or dataclass whose fields are its parameters.
+
+    Optional besides `solve`:
+
+    ``unsupported_reason(self, scene) -> str | None``
+        Why this scene cannot be solved; its cell is then skipped, not failed.
+    ``presets: ClassVar[Mapping[str, Mapping[str, object]]]``
+        Named sets of parameters, chosen as ``name[preset=paper]``.
+    """
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        """Estimate the disparities of the scene's reference view, at least."""
+        ...
+
+
+Presets = ClassVar[Mapping[str, Mapping[str, object]]]

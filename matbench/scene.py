@@ -1,0 +1,210 @@
+"""A scene: rectified, evenly spaced views and what is known about them."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from hashlib import sha256
+from math import isfinite
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from attrs import evolve, field, frozen
+from numpy.typing import NDArray
+
+from matbench.errors import UserError
+
+
+class SceneError(UserError):
+    """A scene that contradicts itself, or a choice of views that it cannot give."""
+
+
+@frozen
+class Range:
+    """Least and largest disparity, both included, in pixels per view step; may be negative.
+
+    Raises
+    ------
+    SceneError
+        If a bound is not finite or the range is empty.
+    """
+
+    least: float
+    largest: float
+
+    def __attrs_post_init__(self) -> None:
+        if not (isfinite(self.least) and isfinite(self.largest)):
+            raise SceneError(f"disparity range {self} must have finite bounds")
+        if self.largest < self.least:
+            raise SceneError(f"disparity range {self} is empty: the first must not exceed the second")
+
+    def __str__(self) -> str:
+        return f"{self.least:g}..{self.largest:g}"
+
+    def scaled(self, factor: float) -> "Range":
+        return Range(self.least * factor, self.largest * factor)
+
+
+def _frozen_array(array: NDArray[Any]) -> NDArray[Any]:
+    """A read-only, contiguous array; copied only where somebody else could still write to it."""
+    own = np.ascontiguousarray(array)
+    if own.flags.writeable:
+        own = own.copy() if own is array else own
+        own.setflags(write=False)
+    return own
+
+
+def _frozen_arrays(arrays: Mapping[Any, NDArray[Any]]) -> Mapping[Any, NDArray[Any]]:
+    return MappingProxyType({key: _frozen_array(array) for key, array in arrays.items()})
+
+
+@frozen(eq=False)
+class Scene:
+    """n rectified views taken at even steps along a line, and ground truth for some of them.
+
+    A point of disparity d (pixels per view step) that view `ref` sees at column x is seen by view
+    j at column ``x - (j - ref) * d``, in the same row; nearer points have larger disparities.
+
+    Parameters
+    ----------
+    name
+        What the scene is called, options in brackets included.
+    views
+        (n, H, W, 3) uint8, RGB, from left to right; n >= 2.
+    labels
+        What each view is called on disk, such as ``"2"`` or ``"col3"``.
+    ref
+        Index of the reference view: the one that is scored.
+    disparities
+        The range to search, in pixels per view step.
+    truth
+        View index -> (H, W) float32, pixels per view step, NaN where unknown.
+    pair_steps
+        How many view steps lie between the two views in whose pixels the field gives its
+        thresholds; errors are multiplied by it before they meet a threshold.
+    regions
+        Name -> (H, W) bool mask of the reference view. They come from the full scene and do not
+        change when views are chosen.
+    visible
+        View index i -> (n, H, W) bool: does view j see the surface point that view i sees at this
+        pixel? Only where it is known exactly (synthetic scenes).
+
+    Raises
+    ------
+    SceneError
+        If sizes, types or indices contradict one another.
+    """
+
+    name: str
+    views: NDArray[np.uint8] = field(converter=_frozen_array)
+    labels: tuple[str, ...] = field(converter=tuple)
+    ref: int
+    disparities: Range
+    truth: Mapping[int, NDArray[np.float32]] = field(converter=_frozen_arrays)
+    pair_steps: float
+    regions: Mapping[str, NDArray[np.bool_]] = field(converter=_frozen_arrays, factory=dict)
+    visible: Mapping[int, NDArray[np.bool_]] = field(converter=_frozen_arrays, factory=dict)
+
+    def __attrs_post_init__(self) -> None:
+        shape = self.views.shape
+        if len(shape) != 4 or shape[3] != 3 or self.views.dtype != np.uint8:
+            raise SceneError(f"{self.name}: views are {shape} {self.views.dtype}, not (n, H, W, 3) uint8")
+        if shape[0] < 2 or shape[1] < 1 or shape[2] < 1:
+            raise SceneError(f"{self.name}: {shape[0]} views of {shape[2]}x{shape[1]} px; two non-empty views are the least")
+        if len(self.labels) != shape[0]:
+            raise SceneError(f"{self.name}: {shape[0]} views but {len(self.labels)} labels")
+        if not 0 <= self.ref < shape[0]:
+            raise SceneError(f"{self.name}: reference view {self.ref} is not one of 0..{shape[0] - 1}")
+        if not (isfinite(self.pair_steps) and self.pair_steps > 0):
+            raise SceneError(f"{self.name}: pair_steps is {self.pair_steps}, not a positive number")
+        for view, truth in self.truth.items():
+            if not 0 <= view < shape[0] or truth.shape != shape[1:3] or truth.dtype != np.float32:
+                raise SceneError(f"{self.name}: truth of view {view} is {truth.shape} {truth.dtype}, not {shape[1:3]} float32")
+        for name, mask in self.regions.items():
+            if mask.shape != shape[1:3] or mask.dtype != np.bool_:
+                raise SceneError(f"{self.name}: region {name!r} is {mask.shape} {mask.dtype}, not {shape[1:3]} bool")
+        for view, seen in self.visible.items():
+            if seen.shape != shape[:3] or seen.dtype != np.bool_:
+                raise SceneError(f"{self.name}: visibility of view {view} is {seen.shape} {seen.dtype}, not {shape[:3]} bool")
+
+    @property
+    def n(self) -> int:
+        """Number of views."""
+        return int(self.views.shape[0])
+
+    @property
+    def height(self) -> int:
+        return int(self.views.shape[1])
+
+    @property
+    def width(self) -> int:
+        return int(self.views.shape[2])
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of everything a method may see: pixels, order, reference view and range."""
+        facts = f"{self.views.shape} {self.labels} {self.ref} {self.disparities} {self.pair_steps!r}"
+        return sha256(facts.encode() + self.views.tobytes()).hexdigest()
+
+    @cached_property
+    def truth_digest(self) -> str:
+        """SHA-256 of everything the scorer adds: the reference view's truth and its regions."""
+        parts = [self.truth[self.ref].tobytes() if self.ref in self.truth else b""]
+        parts += [name.encode() + mask.tobytes() for name, mask in sorted(self.regions.items())]
+        return sha256(b"|".join(parts)).hexdigest()
+
+    def choose(self, indices: Sequence[int], name: str | None = None) -> "Scene":
+        """The same scene seen by fewer views.
+
+        Disparities, truth and `pair_steps` are rescaled to the wider view step; regions stay.
+
+        Parameters
+        ----------
+        indices
+            Views to keep: increasing, evenly spaced, at least two, `ref` among them.
+
+        Raises
+        ------
+        SceneError
+            If they are not.
+        """
+        kept = list(indices)
+        called = ", ".join(self.labels[i] if 0 <= i < self.n else str(i) for i in kept)
+        if len(kept) < 2:
+            raise SceneError(f"{self.name}: views {called or 'none'} chosen; at least two are needed")
+        steps = {b - a for a, b in zip(kept, kept[1:], strict=False)}
+        if kept[0] < 0 or kept[-1] >= self.n or len(steps) != 1 or min(steps) < 1:
+            raise SceneError(f"{self.name}: views {called} are not evenly spaced from left to right; possible: {', '.join(self.labels)}")
+        if self.ref not in kept:
+            raise SceneError(f"{self.name}: views {called} lack the reference view {self.labels[self.ref]}")
+        step = steps.pop()
+        place = {old: new for new, old in enumerate(kept)}
+        return evolve(
+            self,
+            name=self.name if name is None else name,
+            views=self.views[kept],
+            labels=tuple(self.labels[i] for i in kept),
+            ref=place[self.ref],
+            disparities=self.disparities.scaled(step),
+            truth={place[i]: truth * np.float32(step) for i, truth in self.truth.items() if i in place},
+            pair_steps=self.pair_steps / step,
+            visible={place[i]: seen[kept] for i, seen in self.visible.items() if i in place},
+        )
+
+    def widest(self, count: int) -> tuple[int, ...]:
+        """Indices of at most `count` evenly spaced views around the reference view.
+
+        The widest spacing that fits wins, then the choice that has the reference view nearest to
+        its middle, then the one that reaches further right. On the paper's scenes four views are
+        Tsukuba col2-5, Rocks1 view0-3 and Teddy im0, 2, 4, 6, as in the paper.
+        """
+        count = min(count, self.n)
+        if count < 2:
+            raise SceneError(f"{self.name}: {count} views asked for; at least two are needed")
+        fits = [
+            (step, -abs(2 * place - (count - 1)), -place, self.ref - place * step)
+            for step in range(1, (self.n - 1) // (count - 1) + 1)
+            for place in range(count)
+            if self.ref - place * step >= 0 and self.ref + (count - 1 - place) * step < self.n
+        ]
+        step, _, _, first = max(fits)
+        return tuple(range(first, first + count * step, step))
