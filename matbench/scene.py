@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from hashlib import sha256
+from itertools import pairwise
 from math import isfinite
 from types import MappingProxyType
 from typing import Any
@@ -96,7 +97,7 @@ class Scene:
 
     name: str
     views: NDArray[np.uint8] = field(converter=_frozen_array)
-    labels: tuple[str, ...] = field(converter=tuple)
+    labels: tuple[str, ...]
     ref: int
     disparities: Range
     truth: Mapping[int, NDArray[np.float32]] = field(converter=_frozen_arrays)
@@ -109,7 +110,7 @@ class Scene:
         if len(shape) != 4 or shape[3] != 3 or self.views.dtype != np.uint8:
             raise SceneError(f"{self.name}: views are {shape} {self.views.dtype}, not (n, H, W, 3) uint8")
         if shape[0] < 2 or shape[1] < 1 or shape[2] < 1:
-            raise SceneError(f"{self.name}: {shape[0]} views of {shape[2]}x{shape[1]} px; two non-empty views are the least")
+            raise SceneError(f"{self.name}: {shape[0]} views of {shape[2]}x{shape[1]} px; at least two, not empty")
         if len(self.labels) != shape[0]:
             raise SceneError(f"{self.name}: {shape[0]} views but {len(self.labels)} labels")
         if not 0 <= self.ref < shape[0]:
@@ -118,13 +119,15 @@ class Scene:
             raise SceneError(f"{self.name}: pair_steps is {self.pair_steps}, not a positive number")
         for view, truth in self.truth.items():
             if not 0 <= view < shape[0] or truth.shape != shape[1:3] or truth.dtype != np.float32:
-                raise SceneError(f"{self.name}: truth of view {view} is {truth.shape} {truth.dtype}, not {shape[1:3]} float32")
+                found = f"{truth.shape} {truth.dtype}"
+                raise SceneError(f"{self.name}: truth of view {view} is {found}, not {shape[1:3]} float32")
         for name, mask in self.regions.items():
             if mask.shape != shape[1:3] or mask.dtype != np.bool_:
                 raise SceneError(f"{self.name}: region {name!r} is {mask.shape} {mask.dtype}, not {shape[1:3]} bool")
         for view, seen in self.visible.items():
             if seen.shape != shape[:3] or seen.dtype != np.bool_:
-                raise SceneError(f"{self.name}: visibility of view {view} is {seen.shape} {seen.dtype}, not {shape[:3]} bool")
+                found = f"{seen.shape} {seen.dtype}"
+                raise SceneError(f"{self.name}: visibility of view {view} is {found}, not {shape[:3]} bool")
 
     @property
     def n(self) -> int:
@@ -171,9 +174,10 @@ class Scene:
         called = ", ".join(self.labels[i] if 0 <= i < self.n else str(i) for i in kept)
         if len(kept) < 2:
             raise SceneError(f"{self.name}: views {called or 'none'} chosen; at least two are needed")
-        steps = {b - a for a, b in zip(kept, kept[1:], strict=False)}
+        steps = {b - a for a, b in pairwise(kept)}
         if kept[0] < 0 or kept[-1] >= self.n or len(steps) != 1 or min(steps) < 1:
-            raise SceneError(f"{self.name}: views {called} are not evenly spaced from left to right; possible: {', '.join(self.labels)}")
+            possible = ", ".join(self.labels)
+            raise SceneError(f"{self.name}: views {called} are not evenly spaced, left to right; possible: {possible}")
         if self.ref not in kept:
             raise SceneError(f"{self.name}: views {called} lack the reference view {self.labels[self.ref]}")
         step = steps.pop()
