@@ -1,0 +1,74 @@
+"""What `matbench list` shows: methods with parameters, scenes with sizes, metrics."""
+
+import inspect
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from matbench import plugins, scoring, spec
+from matbench.errors import UserError
+from matbench.scenes import listings
+
+
+def known(data: Path | None = None, files: Sequence[Path] = ()) -> dict[str, Any]:
+    """Everything that can be named on the command line, as plain values for JSON."""
+    return {
+        "algorithms": {name: _algorithm(plugin) for name, plugin in sorted(plugins.algorithms(files).items())},
+        "scenes": {name: _scene(found) for name, found in listings(data).items()},
+        "metrics": {m.name: {"unit": m.unit, "better": m.better, "about": m.about} for m in scoring.metrics()},
+    }
+
+
+def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
+    facts: dict[str, Any] = {"source": plugin.source}
+    try:
+        cls = plugin.load()
+    except UserError as error:
+        return facts | {"error": str(error)}
+    parameters = spec.parameters(cls)
+    empty = inspect.Parameter.empty
+    return facts | {
+        "about": (inspect.getdoc(cls) or "").split("\n\n")[0].replace("\n", " "),
+        "presets": sorted(getattr(cls, "presets", {})),
+        "parameters": {
+            name: {"type": spec.describe(kind), "default": None if default is empty else default}
+            for name, (kind, default) in parameters.items()
+        },
+    }
+
+
+def _scene(found: Any) -> dict[str, Any]:
+    if isinstance(found, UserError):
+        return {"error": str(found)}
+    return {"views": found.views, "sizes": {k: list(v) for k, v in found.sizes.items()}, "present": found.present}
+
+
+def tables(everything: dict[str, Any]) -> list[Table]:
+    """The same as tables for a terminal."""
+    methods = Table("algorithm", "parameters and defaults", title="Algorithms", title_justify="left", expand=False)
+    for name, facts in everything["algorithms"].items():
+        if "error" in facts:
+            methods.add_row(escape(name), f"[red]{escape(facts['error'])}[/]")
+            continue
+        lines = [facts["about"]]
+        lines += [f"  {key}={_shown(p['default'])}: {p['type']}" for key, p in facts["parameters"].items()]
+        lines += [f"  preset={preset}" for preset in facts["presets"]]
+        methods.add_row(escape(name), escape("\n".join(lines)))
+    scenes = Table("scene", "views", "sizes (default first)", "present", title="Scenes", title_justify="left")
+    for name, facts in everything["scenes"].items():
+        if "error" in facts:
+            scenes.add_row(escape(name), "", f"[red]{escape(facts['error'])}[/]", "no")
+            continue
+        sizes = ", ".join(f"{size} {w}x{h}" for size, (w, h) in facts["sizes"].items())
+        scenes.add_row(escape(name), str(facts["views"]), sizes, "yes" if facts["present"] else "no")
+    metrics = Table("metric", "unit", "better", "about", title="Metrics", title_justify="left")
+    for name, facts in everything["metrics"].items():
+        metrics.add_row(escape(name), facts["unit"], facts["better"], escape(facts["about"]))
+    return [methods, scenes, metrics]
+
+
+def _shown(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,129 @@
+"""What a run will do: the request, and its cells keyed by content."""
+
+import json
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from attrs import field, frozen
+
+from matbench import plugins, spec
+from matbench.errors import UserError
+from matbench.scene import Scene
+
+SCHEMA = 1  # of cells and their keys; a change of what is stored makes all of them anew
+
+
+def digest(value: Any) -> str:
+    """Sixteen hexadecimal digits of SHA-256 over a value's canonical JSON."""
+    return sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:16]
+
+
+@frozen
+class Method:
+    """A method with one set of parameters.
+
+    Parameters
+    ----------
+    algorithm
+        Its name.
+    params
+        Every parameter with its value.
+    changed
+        Only those that differ from their defaults, as text: how tables tell methods apart.
+    code
+        SHA-256 of its code.
+    """
+
+    algorithm: str
+    params: Mapping[str, spec.Value]
+    changed: str = ""
+    code: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.algorithm}[{self.changed}]" if self.changed else self.algorithm
+
+
+@frozen
+class Cell:
+    """One method on one scene with one seed.
+
+    Parameters
+    ----------
+    key
+        Digest of everything that decides the answer; the name of the cell's folder.
+    """
+
+    method: Method
+    scene: str
+    scene_digest: str
+    seed: int
+    key: str
+
+    def __str__(self) -> str:
+        return f"{self.method} on {self.scene}" + (f", seed {self.seed}" if self.seed else "")
+
+
+@frozen
+class Plan:
+    """All cells of a run, in order: scene by scene, so that partial results compare like with like.
+
+    Parameters
+    ----------
+    cells
+        What is to be computed.
+    plugin_files
+        The users' own files that hold methods.
+    """
+
+    cells: tuple[Cell, ...]
+    plugin_files: tuple[str, ...] = field(default=())
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """What was asked for, without code and pixels: the same request resumes the same run."""
+        methods = {str(c.method): [c.method.algorithm, dict(c.method.params)] for c in self.cells}
+        return {
+            "algorithms": [methods[name] for name in sorted(methods)],
+            "scenes": sorted({c.scene for c in self.cells}),
+            "seeds": sorted({c.seed for c in self.cells}),
+        }
+
+    @property
+    def digest(self) -> str:
+        """Short digest of the request; it names the default run folder."""
+        return digest(self.request)[:8]
+
+
+def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[Method]:
+    """The methods that selectors mean, each once, parameters checked.
+
+    Raises
+    ------
+    UserError
+        For an unknown method or parameter, or a value that it does not take.
+    """
+    found: dict[str, Method] = {}
+    for one in spec.expand(selectors):
+        plugin = plugins.algorithm(one.name, files)
+        instance = spec.build(plugin.name, plugin.load(), one.options)
+        if not callable(getattr(instance, "solve", None)):
+            raise UserError(f"{plugin.name} from {plugin.source} is no method: it has no solve(scene, context)")
+        changed = spec.text(spec.changed(instance))
+        method = Method(plugin.name, spec.values_of(instance), changed, plugins.code_digest(plugin))
+        found.setdefault(str(method), method)
+    return list(found.values())
+
+
+def make_plan(
+    chosen: Sequence[Method], scenes: Mapping[str, Scene], seeds: Sequence[int], files: Sequence[Path] = ()
+) -> Plan:
+    """Every method on every scene with every seed."""
+    cells = []
+    for name, scene in scenes.items():
+        for method in chosen:
+            for seed in seeds:
+                facts = [SCHEMA, method.algorithm, dict(method.params), method.code, name, scene.digest, seed]
+                cells.append(Cell(method, name, scene.digest, seed, digest(facts)))
+    return Plan(tuple(cells), tuple(str(path) for path in files))

@@ -1,0 +1,111 @@
+"""Working through a plan: each cell in a process of its own, results as they come."""
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import TimeoutError as FutureTimeout
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from types import ModuleType
+from typing import Literal
+
+from pebble import ProcessExpired, ProcessPool
+
+from matbench.plan import Cell, Plan
+from matbench.store import FINAL, Outcome, Store, write_cell
+from matbench.worker import Job, run_cell
+
+Event = Literal["start", "done"]
+Listener = Callable[[Event, Cell, Outcome | None], None]
+
+
+def threads() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def pending(plan: Plan, store: Store, record: bool) -> list[Cell]:
+    """The cells that still have to be computed: those without a final outcome or a recording asked for."""
+
+    def is_done(cell: Cell) -> bool:
+        outcome = store.outcome(cell)
+        if outcome is None or outcome.status not in FINAL:
+            return False
+        return not (record and outcome.status == "ok") or (store.cell(cell) / "recording.rrd").exists()
+
+    return [cell for cell in plan.cells if not is_done(cell)]
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Keep child processes from running the user's script again: nothing that they do lies in it."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
+
+
+def run(
+    plan: Plan,
+    store: Store,
+    *,
+    data: Path | None,
+    record: bool = False,
+    preload: Iterable[str] = (),
+    listen: Listener | None = None,
+) -> None:
+    """Compute every cell of a plan that is not done.
+
+    One cell at a time, so that seconds are comparable. Each is solved in a fresh process forked
+    from a small server that has imported the libraries once; whatever a method does to its
+    process costs that cell alone. `KeyboardInterrupt` ends the cell under way and is passed on;
+    what is finished stays.
+
+    Parameters
+    ----------
+    preload
+        Modules that the server imports besides the harness, such as those of the methods.
+    listen
+        Told as each cell starts and ends.
+    """
+    tell = listen or (lambda *_: None)
+    todo = pending(plan, store, record)
+    if not todo:
+        return
+    store.sweep()
+    context = get_context("forkserver" if hasattr(os, "fork") else "spawn")
+    context.set_forkserver_preload(["matbench.worker", *preload])
+    with _without_main(), ProcessPool(max_workers=1, max_tasks=1, context=context) as pool:
+        try:
+            for cell in todo:
+                tell("start", cell, None)
+                job = Job(store.folder, cell, data, plan.plugin_files, threads(), record)
+                outcome = _finish(pool, job, store)
+                tell("done", cell, outcome)
+        except BaseException:
+            pool.stop()
+            pool.join()
+            raise
+
+
+def _finish(pool: ProcessPool, job: Job, store: Store) -> Outcome:
+    future = pool.schedule(run_cell, args=[job])
+    try:
+        while True:
+            try:
+                future.result(timeout=1)  # in slices: a signal is answered within a second
+                break
+            except FutureTimeout:
+                if future.done():
+                    raise
+    except ProcessExpired as error:
+        code = f"exit status {error.exitcode}" if error.exitcode is not None else "no exit status"
+        outcome = Outcome("crashed", reason=f"the method ended its process ({code})")
+        with store.building(job.cell) as draft:
+            write_cell(draft, job.cell, outcome)
+        return outcome
+    outcome = store.outcome(job.cell)
+    return outcome or Outcome("failed", reason="the cell's process left no result")

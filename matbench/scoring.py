@@ -1,0 +1,81 @@
+"""Tables of a run, computed from its stored maps: no method runs again for a new metric."""
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from matbench import plugins
+from matbench.errors import UserError
+from matbench.metrics import Metric, score
+from matbench.plan import Plan
+from matbench.scene import Scene
+from matbench.store import Store
+
+RESULT_COLUMNS = ("algorithm", "params", "scene", "view", "seed", "region", "metric", "value", "unit", "pixels")
+CELL_COLUMNS = (
+    "algorithm",
+    "params",
+    "scene",
+    "seed",
+    "status",
+    "seconds",
+    "warmup_seconds",
+    "peak_mb",
+    "threads",
+    "work",
+    "reason",
+    "cell",
+)
+
+
+def metrics() -> tuple[Metric, ...]:
+    """Every metric that plug-ins offer, the built-in ones first.
+
+    Raises
+    ------
+    UserError
+        If a plug-in cannot be imported, gives something else than metrics, or takes a name twice.
+    """
+    found: dict[str, Metric] = {}
+    by_source = sorted(plugins.installed("metrics").values(), key=lambda p: p.source != "matbench-stereo")
+    for plugin in by_source:
+        loaded = plugin.load()
+        for metric in [loaded] if isinstance(loaded, Metric) else loaded:
+            if not isinstance(metric, Metric) or metric.name in found:
+                raise UserError(f"metric plug-in {plugin.name!r} from {plugin.source}: {metric!r} is no new Metric")
+            found[metric.name] = metric
+    return tuple(found.values())
+
+
+def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFrame:
+    """One row for each finished cell, region of the reference view and metric.
+
+    Columns are `RESULT_COLUMNS`: shares in per cent of `pixels`, errors in pixels of the pair.
+    """
+    used, rows = metrics(), []
+    for cell in plan.cells:
+        outcome = store.outcome(cell)
+        if outcome is None or outcome.status != "ok":
+            continue
+        scene = scenes[cell.scene]
+        estimate, truth = store.disparity(cell)[scene.ref], scene.truth[scene.ref]
+        for region, mask in scene.regions.items():
+            values = score(estimate, truth, mask, scene.pair_steps, used)
+            head = (cell.method.algorithm, cell.method.changed, cell.scene, scene.labels[scene.ref], cell.seed, region)
+            rows += [(*head, m.name, values[m.name], m.unit, int(mask.sum())) for m in used]
+    return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
+
+
+def cells(plan: Plan, store: Store) -> pd.DataFrame:
+    """One row for each cell of the plan: what became of it and what it cost (`CELL_COLUMNS`)."""
+    rows = []
+    for cell in plan.cells:
+        outcome = store.outcome(cell)
+        head = (cell.method.algorithm, cell.method.changed, cell.scene, cell.seed)
+        if outcome is None:
+            rows.append((*head, "interrupted", None, None, None, None, "", "not computed yet", cell.key))
+            continue
+        cost = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb, outcome.threads)
+        work = " ".join(f"{name}={count}" for name, count in outcome.work.items())
+        rows.append((*head, outcome.status, *cost, work, outcome.reason, cell.key))
+    return pd.DataFrame(rows, columns=list(CELL_COLUMNS))

@@ -1,0 +1,184 @@
+"""Selectors such as ``materiality[pairs=all,consecutive passes=20]``: a name and options in brackets.
+
+Options are separated by blanks; commas inside a value mean "each of these in turn". Brackets are
+read before anything else, so what stands before them may be a glob pattern.
+"""
+
+import inspect
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+from itertools import product
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+from attrs import field, frozen
+from cattrs import Converter
+
+from matbench.errors import UserError, unknown
+
+Value = bool | int | float | str
+
+
+@frozen
+class Spec:
+    """A name and one value for each option."""
+
+    name: str
+    options: Mapping[str, str] = field(factory=dict)
+
+    def __str__(self) -> str:
+        return label(self.name, self.options)
+
+
+def label(name: str, options: Mapping[str, Value]) -> str:
+    """``name`` or ``name[key=value ...]``, keys in the order given.
+
+    >>> label("sgbm", {"fill": False, "block_size": 5})
+    'sgbm[fill=false block_size=5]'
+    """
+    return f"{name}[{text(options)}]" if options else name
+
+
+def text(options: Mapping[str, Value]) -> str:
+    """``key=value ...`` as it is typed."""
+    return " ".join(f"{key}={str(v).lower() if isinstance(v, bool) else v}" for key, v in options.items())
+
+
+def parse(selector: str) -> list[Spec]:
+    """Read one selector, or several separated by commas, into every combination of its values.
+
+    >>> [str(s) for s in parse("a[x=1,2 y=3],b")]
+    ['a[x=1 y=3]', 'a[x=2 y=3]', 'b']
+
+    Raises
+    ------
+    UserError
+        If the brackets or the options in them are malformed.
+    """
+    specs = []
+    for part in re.split(r",(?![^\[]*\])", selector):
+        found = re.fullmatch(r"\s*([^\[\]\s]+)\s*(?:\[([^\[\]]*)\])?\s*", part)
+        if not found:
+            raise UserError(
+                f"cannot read {part!r}: write NAME or NAME[key=value key=value], such as 'sgbm[fill=false]'"
+            )
+        name, inside = found.group(1), found.group(2) or ""
+        choices: dict[str, list[str]] = {}
+        for option in inside.split():
+            key, equals, values = option.partition("=")
+            if not (key and equals and all(values.split(","))):
+                raise UserError(f"cannot read {option!r} in {part.strip()!r}: write key=value or key=value,value")
+            if key in choices:
+                raise UserError(f"{key!r} stands twice in {part.strip()!r}: write {key}=value,value for each in turn")
+            choices[key] = values.split(",")
+        specs += [Spec(name, dict(zip(choices, picked, strict=True))) for picked in product(*choices.values())]
+    return specs
+
+
+def _strict(kind: type, read: Mapping[str, Any] | None = None) -> Any:
+    def hook(value: Any, _: type) -> Any:
+        if isinstance(value, kind) and not (kind is not bool and isinstance(value, bool)):
+            return value
+        if read is not None:
+            return read[str(value).lower()]
+        if isinstance(value, float) and kind is int:
+            raise ValueError(value)
+        return kind(value)
+
+    return hook
+
+
+def _is_literal(kind: Any) -> bool:
+    return bool(get_origin(kind) == Literal)
+
+
+def _literal(value: Any, kind: Any) -> Any:
+    return {str(choice): choice for choice in get_args(kind)}[str(value)]
+
+
+@cache
+def _converter() -> Converter:
+    converter = Converter()
+    truths = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+    converter.register_structure_hook(bool, _strict(bool, truths))
+    converter.register_structure_hook(int, _strict(int))
+    converter.register_structure_hook(float, _strict(float))
+    converter.register_structure_hook_func(_is_literal, _literal)
+    return converter
+
+
+def describe(kind: Any) -> str:
+    """A parameter's type in words: "a whole number", "plane, ray or volume"."""
+    if _is_literal(kind):
+        *most, last = map(str, get_args(kind))
+        return f"{', '.join(most)} or {last}" if most else last
+    return {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}.get(kind, str(kind))
+
+
+def parameters(cls: type) -> dict[str, tuple[Any, Any]]:
+    """Name -> (type, default) of every parameter of a method; `inspect.Parameter.empty` for none."""
+    hints = get_type_hints(vars(cls)["__init__"]) if "__init__" in vars(cls) else {}
+    signature = inspect.signature(cls)
+    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    return {p.name: (hints.get(p.name, str), p.default) for p in signature.parameters.values() if p.kind in kinds}
+
+
+def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
+    """Make an instance of a method from typed or written options.
+
+    ``preset=NAME`` starts from one of the method's named sets; other options then override it.
+
+    Raises
+    ------
+    UserError
+        For an unknown parameter or preset, or a value of the wrong kind, naming what is possible.
+    """
+    fields = parameters(cls)
+    chosen = dict(options)
+    presets: Mapping[str, Mapping[str, Any]] = getattr(cls, "presets", {})
+    preset = chosen.pop("preset", None) if "preset" not in fields else None
+    if preset is not None and preset not in presets:
+        raise unknown(f"preset of {name}", str(preset), presets)
+    values: dict[str, Any] = dict(presets[preset]) if preset is not None else {}
+    for key, value in chosen.items():
+        if key not in fields:
+            raise unknown(f"parameter of {name}", key, [*fields, *(["preset"] if presets else [])])
+        kind = fields[key][0]
+        try:
+            values[key] = _converter().structure(value, kind)
+        except (ValueError, KeyError, TypeError, OverflowError):
+            raise UserError(f"{name}: {key}={value} is not {describe(kind)}") from None
+    missing = [key for key, (_, default) in fields.items() if default is inspect.Parameter.empty and key not in values]
+    if missing:
+        raise UserError(f"{name}: {', '.join(missing)} must be given, as {name}[{missing[0]}=VALUE]")
+    try:
+        return cls(**values)
+    except (ValueError, TypeError) as error:
+        raise UserError(f"{name}: {first_line(error)}") from None
+
+
+def values_of(instance: object) -> dict[str, Value]:
+    """Every parameter of a method's instance with its value."""
+    return {key: getattr(instance, key) for key in parameters(type(instance))}
+
+
+def changed(instance: object) -> dict[str, Value]:
+    """Only those parameters that differ from their defaults."""
+    fields = parameters(type(instance))
+    return {key: value for key, value in values_of(instance).items() if value != fields[key][1]}
+
+
+def first_line(error: BaseException) -> str:
+    """What an exception says, in one line; its type where it says nothing."""
+    said = str(error.args[0] if error.args else error).strip()
+    return said.splitlines()[0] if said else type(error).__name__
+
+
+def expand(selectors: str | Iterable[str]) -> list[Spec]:
+    """All specs of one or several selectors, in order, each once."""
+    texts = [selectors] if isinstance(selectors, str) else list(selectors)
+    found: dict[str, Spec] = {}
+    for one in texts:
+        for spec in parse(one):
+            found.setdefault(str(spec), spec)
+    return list(found.values())

@@ -1,0 +1,202 @@
+"""A run on disk: plan, cells and tables. A cell is there whole, or it is not there."""
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from attrs import frozen
+from cattrs.preconf.json import make_converter
+from numpy.typing import NDArray
+
+from matbench.errors import UserError
+from matbench.plan import Cell, Plan
+
+Status = Literal["ok", "skipped", "failed", "crashed", "interrupted"]
+FINAL: frozenset[Status] = frozenset({"ok", "skipped"})
+
+_json = make_converter()
+
+
+@frozen
+class Outcome:
+    """What became of a cell.
+
+    Parameters
+    ----------
+    seconds
+        Wall time of the solve alone: no imports, no compilation, no recording.
+    warmup_seconds
+        Wall time of a first solve on a tiny scene of the same kind, compilation included.
+    peak_mb
+        Largest resident memory of the cell's process during the solve, in MiB.
+    reason
+        Why it is not `ok`, in one line.
+    work, history
+        As the estimate gave them.
+    """
+
+    status: Status
+    seconds: float | None = None
+    warmup_seconds: float | None = None
+    peak_mb: float | None = None
+    threads: int | None = None
+    reason: str = ""
+    work: Mapping[str, int] = {}
+    history: Mapping[str, list[float]] = {}
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file beside its place and move it there whole."""
+    with tempfile.NamedTemporaryFile(
+        "w", dir=path.parent, prefix=f".{path.name}.", delete=False, encoding="utf-8"
+    ) as file:
+        try:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+            Path(file.name).chmod(0o644)
+            Path(file.name).replace(path)
+        except BaseException:
+            Path(file.name).unlink(missing_ok=True)
+            raise
+
+
+@frozen
+class Store:
+    """One run folder."""
+
+    folder: Path
+
+    @classmethod
+    def open(cls, folder: Path, plan: Plan) -> "Store":
+        """Make a run folder for a plan, or take up the one that holds the same request.
+
+        Raises
+        ------
+        UserError
+            If the folder holds a different plan, or something that is no run.
+        """
+        store = cls(folder)
+        if folder.exists() and not folder.is_dir():
+            raise UserError(f"output {str(folder)!r} is a file: name a folder that is new or holds this run")
+        if (folder / "plan.json").exists():
+            if store.request() != plan.request:
+                raise UserError(f"output folder {str(folder)!r} holds a different plan: name another folder by --out")
+        elif folder.exists() and any(folder.iterdir()):
+            raise UserError(
+                f"output folder {str(folder)!r} is not empty and holds no run: name another folder by --out"
+            )
+        try:
+            (folder / "cells").mkdir(parents=True, exist_ok=True)
+            write_text(folder / "plan.json", json.dumps({"request": plan.request, **_json.unstructure(plan)}, indent=1))
+        except OSError as error:
+            raise UserError(f"output folder {str(folder)!r} cannot be written: {error.strerror}") from error
+        return store
+
+    def _read(self, path: Path) -> dict[str, Any]:
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise UserError(f"{path} cannot be read: {error.strerror}; give a run folder") from error
+        except ValueError as error:
+            raise UserError(f"{path} is damaged: not JSON") from error
+        if not isinstance(found, dict):
+            raise UserError(f"{path} is damaged: not a JSON object")
+        return found
+
+    def request(self) -> Any:
+        """What the run in this folder was asked for."""
+        return self._read(self.folder / "plan.json").get("request")
+
+    def plan(self) -> Plan:
+        """The plan of the run in this folder."""
+        try:
+            plan = _json.structure(self._read(self.folder / "plan.json"), Plan)
+        except Exception as error:  # whatever cattrs raises for a hostile or damaged plan
+            if isinstance(error, UserError):
+                raise
+            raise UserError(f"{self.folder / 'plan.json'} is damaged: it is not a plan") from error
+        if not all(len(c.key) == 16 and set(c.key) <= set("0123456789abcdef") for c in plan.cells):
+            raise UserError(f"{self.folder / 'plan.json'} is damaged: a cell's key is not 16 hexadecimal digits")
+        return plan
+
+    def cell(self, cell: Cell) -> Path:
+        """Where a cell's files lie once it is done."""
+        return self.folder / "cells" / cell.key
+
+    def outcome(self, cell: Cell) -> Outcome | None:
+        """What became of a cell, or None if it has not been computed."""
+        path = self.cell(cell) / "cell.json"
+        if not path.exists():
+            return None
+        try:
+            return _json.structure(self._read(path)["outcome"], Outcome)
+        except Exception:  # half a cell is no cell: it is computed anew
+            return None
+
+    @contextmanager
+    def building(self, cell: Cell) -> Iterator[Path]:
+        """A folder beside a cell's place, moved there when the block ends, removed if it fails."""
+        draft = Path(tempfile.mkdtemp(prefix=f".{cell.key}.", dir=self.folder / "cells"))
+        try:
+            yield draft
+            draft.chmod(0o755)
+            place = self.cell(cell)
+            if place.exists():
+                self.remove(cell)
+            draft.replace(place)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+
+    def remove(self, cell: Cell) -> None:
+        """Take a cell away, in one step: aside first, then to pieces."""
+        aside = Path(tempfile.mkdtemp(prefix=".removed.", dir=self.folder / "cells"))
+        with suppress(FileNotFoundError):
+            self.cell(cell).replace(aside / cell.key)
+        shutil.rmtree(aside, ignore_errors=True)
+
+    def recording(self, part: str | None = None) -> Path:
+        """The recording of the one cell whose name or key contains `part`.
+
+        Raises
+        ------
+        UserError
+            If none has one, or several have.
+        """
+        paths = {str(c): self.cell(c) / "recording.rrd" for c in self.plan().cells}
+        recorded = {name: path for name, path in paths.items() if path.exists()}
+        if not recorded:
+            raise UserError(f"run {str(self.folder)!r} has no recordings: type its compare command again with --record")
+        hits = [name for name, path in recorded.items() if part is None or part in name or part in path.parent.name]
+        exact = [name for name in hits if name == part]
+        if len(exact or hits) != 1:
+            which = f"{len(hits)} recordings match {part!r}" if part else f"there are {len(hits)} recordings"
+            raise UserError(f"{which}: name one cell of {'; '.join(hits or recorded)}")
+        return recorded[(exact or hits)[0]]
+
+    def sweep(self) -> None:
+        """Remove what runs that were killed left beside the cells."""
+        for draft in (self.folder / "cells").glob(".*"):
+            shutil.rmtree(draft, ignore_errors=True)
+
+    def disparity(self, cell: Cell) -> dict[int, NDArray[np.float32]]:
+        """View index -> (H, W) stored disparity map, pixels per view step."""
+        with np.load(self.cell(cell) / "disparity.npz", allow_pickle=False) as arrays:
+            return {int(name.removeprefix("view_")): arrays[name] for name in arrays.files}
+
+
+def write_cell(
+    draft: Path, cell: Cell, outcome: Outcome, disparity: Mapping[int, NDArray[np.float32]] | None = None
+) -> None:
+    """Fill a cell's folder: its facts and, where it has them, its maps."""
+    if disparity is not None:
+        arrays: dict[str, Any] = {f"view_{view}": values for view, values in disparity.items()}
+        np.savez_compressed(draft / "disparity.npz", **arrays)
+    facts = {"cell": _json.unstructure(cell), "outcome": _json.unstructure(outcome)}
+    (draft / "cell.json").write_text(json.dumps(facts, indent=1), encoding="utf-8")

@@ -1,0 +1,174 @@
+"""Solving one cell, in a process of its own."""
+
+import os
+import resource
+import time
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from matbench import plugins, spec
+from matbench.algorithm import Algorithm, Context, Estimate
+from matbench.errors import UserError
+from matbench.plan import Cell
+from matbench.scene import Scene
+from matbench.scenes import load_scene
+from matbench.spec import first_line
+from matbench.store import Outcome, Store, write_cell
+
+_TINY = 16, 64  # rows and columns of the scene that methods are compiled on
+
+
+@frozen
+class Job:
+    """All that a cell's process needs; small, no arrays.
+
+    Parameters
+    ----------
+    record
+        Solve a second time, untimed, and write a recording.
+    """
+
+    run: Path
+    cell: Cell
+    data: Path | None
+    plugin_files: tuple[str, ...]
+    threads: int
+    record: bool
+
+
+def tiny(scene: Scene) -> Scene:
+    """A corner of a scene: same views, types and range, few pixels."""
+    rows, columns = (min(a, b) for a, b in zip(_TINY, (scene.height, scene.width), strict=True))
+    return evolve(
+        scene,
+        views=scene.views[:, :rows, :columns],
+        truth={view: truth[:rows, :columns] for view, truth in scene.truth.items()},
+        regions={name: mask[:rows, :columns] for name, mask in scene.regions.items()},
+        visible={view: seen[:, :rows, :columns] for view, seen in scene.visible.items()},
+    )
+
+
+def hide_truth(scene: Scene) -> Scene:
+    """The scene as a method may see it: no ground truth and nothing that follows from it."""
+    return evolve(scene, truth={}, regions={}, visible={})
+
+
+def checked(estimate: Any, scene: Scene) -> dict[int, NDArray[np.float32]]:
+    """The disparity maps of an estimate as float32; infinities become NaN.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the method returned something else than an `Estimate` with whole maps.
+    """
+    if not isinstance(estimate, Estimate):
+        raise TypeError(f"solve returned {type(estimate).__name__}, not an Estimate")
+    if scene.ref not in estimate.disparity:
+        raise ValueError(f"the estimate has no disparity map of the reference view {scene.ref}")
+    maps = {}
+    for view, values in estimate.disparity.items():
+        array = np.asarray(values)
+        if not 0 <= view < scene.n:
+            raise ValueError(f"the estimate has a map of view {view}, the scene has {scene.n} views")
+        if array.shape != (scene.height, scene.width) or array.dtype.kind not in "fiu":
+            expected = f"{(scene.height, scene.width)} numbers"
+            raise ValueError(f"the map of view {view} is {array.shape} {array.dtype}, not {expected}")
+        single = array.astype(np.float32)
+        maps[int(view)] = np.where(np.isfinite(single), single, np.float32(np.nan))
+    return maps
+
+
+def _reset_peak() -> None:
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
+
+
+def _peak_mb() -> float:
+    """Largest resident memory since `_reset_peak` (Linux), else since the process began, in MiB."""
+    with suppress(OSError):
+        for line in Path("/proc/self/status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) / 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+@contextmanager
+def _output_to(path: Path) -> Iterator[None]:
+    """Send all that this process prints, from Python or from C, to a file."""
+    with path.open("w", encoding="utf-8", errors="replace", buffering=1) as log:
+        kept = os.dup(1), os.dup(2)
+        os.dup2(log.fileno(), 1)
+        os.dup2(log.fileno(), 2)
+        try:
+            with redirect_stdout(log), redirect_stderr(log):
+                yield
+        finally:
+            for saved, number in zip(kept, (1, 2), strict=True):
+                os.dup2(saved, number)
+                os.close(saved)
+
+
+def _solve(method: Algorithm, scene: Scene, job: Job) -> tuple[Outcome, dict[int, NDArray[np.float32]] | None]:
+    unsupported = getattr(method, "unsupported_reason", None)
+    reason = unsupported(scene) if unsupported else None
+    if reason:
+        return Outcome("skipped", reason=str(reason)), None
+    context = Context(job.cell.seed, job.threads)
+    start = time.perf_counter()
+    method.solve(tiny(scene), context)
+    warmed = time.perf_counter()
+    _reset_peak()
+    begin = time.perf_counter()
+    estimate = method.solve(scene, context)
+    seconds = time.perf_counter() - begin
+    peak = _peak_mb()
+    maps = checked(estimate, scene)
+    history = {name: [float(v) for v in values] for name, values in estimate.history.items()}
+    work = {name: int(count) for name, count in estimate.work.items()}
+    return Outcome("ok", seconds, warmed - start, peak, job.threads, "", work, history), maps
+
+
+def _record(method: Algorithm, scene: Scene, job: Job, path: Path) -> str:
+    """Solve again, recorded; why there is no recording, if there is none: the answer itself stands."""
+    from matbench.recording import record
+
+    def solve(probe: Any) -> Estimate:
+        return method.solve(hide_truth(scene), Context(job.cell.seed, job.threads, probe))
+
+    try:
+        record(path, scene, solve, title=str(job.cell))
+    except Exception as error:
+        traceback.print_exc()
+        return f"not recorded: {type(error).__name__}: {first_line(error)}"
+    return ""
+
+
+def run_cell(job: Job) -> None:
+    """Solve a cell and move its folder into the run, whatever becomes of the method.
+
+    A method that raises is a failed cell with its traceback in ``log.txt``; one that ends the
+    process is noticed by whoever started it.
+    """
+    store, cell = Store(job.run), job.cell
+    with store.building(cell) as draft, _output_to(draft / "log.txt"):
+        maps = None
+        try:
+            plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
+            method = spec.build(plugin.name, plugin.load(), cell.method.params)
+            scene = load_scene(cell.scene, job.data)
+            if scene.digest != cell.scene_digest:
+                raise UserError(f"{cell.scene} is not what it was when the run was planned")
+            outcome, maps = _solve(method, hide_truth(scene), job)
+            if job.record and outcome.status == "ok":
+                outcome = evolve(outcome, reason=_record(method, scene, job, draft / "recording.rrd"))
+        except Exception as error:
+            traceback.print_exc()
+            outcome, maps = Outcome("failed", reason=f"{type(error).__name__}: {first_line(error)}"), None
+        write_cell(draft, cell, outcome, maps)
