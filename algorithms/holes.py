@@ -1,0 +1,36 @@
+"""Filling what a method left unanswered."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def fill_from_background(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Fill every hole of a disparity map from the farther side of its row.
+
+    What one view cannot see lies behind what hides it, so a hole takes the smaller of the nearest
+    known disparities to its left and right (the only one, at the ends of a row). A row without
+    any answer then takes the nearest row that has one, of two equally near the upper.
+
+    Parameters
+    ----------
+    disparity
+        (H, W) float32, any unit, larger is nearer; NaN marks a hole. Left untouched.
+
+    Returns
+    -------
+    (H, W) float32 without NaN, unless all of `disparity` is NaN.
+    """
+    rows, columns = disparity.shape
+    known = ~np.isnan(disparity)
+    here = np.arange(columns)
+    left = np.maximum.accumulate(np.where(known, here, -1), axis=1)
+    right = np.minimum.accumulate(np.where(known, here, columns)[:, ::-1], axis=1)[:, ::-1]
+    # one more column, which stands for "none" on either side: index -1 and index `columns`
+    padded = np.concatenate([disparity, np.full((rows, 1), np.inf, disparity.dtype)], axis=1)
+    filled = np.minimum(np.take_along_axis(padded, left, axis=1), np.take_along_axis(padded, right, axis=1))
+
+    answered = np.flatnonzero(known.any(axis=1))
+    if answered.size == 0:
+        return disparity.copy()
+    nearest = np.abs(np.arange(rows)[:, None] - answered).argmin(axis=1)
+    return np.asarray(filled[answered[nearest]], disparity.dtype)

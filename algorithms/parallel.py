@@ -1,0 +1,24 @@
+"""Rows shared out to threads: kernels release the interpreter's lock, results never depend on the split."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+
+def over_rows(work: Callable[[int, int], None], rows: int, threads: int, block: int = 16) -> None:
+    """Call ``work(first, end)`` for blocks that cover ``range(rows)``, on `threads` threads.
+
+    Parameters
+    ----------
+    work
+        Must write to its own rows only, and the same values however the rows are split.
+    block
+        Rows a call: few enough to balance the threads, enough to hide the cost of a call.
+    """
+    blocks = [(first, min(first + block, rows)) for first in range(0, rows, block)]
+    if threads <= 1 or len(blocks) == 1:
+        for first, end in blocks:
+            work(first, end)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        for done in [pool.submit(work, first, end) for first, end in blocks]:
+            done.result()

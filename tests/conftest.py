@@ -1,0 +1,18 @@
+"""Fixtures for tests of all parts."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def data_root() -> Path:
+    """The folder of real scenes; without one, tests on real scenes skip and say so."""
+    named = os.environ.get("MATBENCH_DATA")
+    if not named:
+        pytest.skip("MATBENCH_DATA is not set: no real scenes")
+    root = Path(named).expanduser()
+    if not root.is_dir():
+        pytest.fail(f"MATBENCH_DATA names {str(root)!r}, which is no folder")
+    return root.resolve()

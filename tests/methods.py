@@ -1,0 +1,101 @@
+"""Methods that behave and misbehave, as a user's plug-in file."""
+
+import os
+import time
+
+import numpy as np
+from attrs import frozen
+
+from matbench import Context, Estimate, Scene
+
+
+def _flat(scene: Scene, value: float) -> Estimate:
+    return Estimate({scene.ref: np.full((scene.height, scene.width), value, np.float32)})
+
+
+@frozen
+class Flat:
+    """One disparity everywhere."""
+
+    value: float = 1.0
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        return _flat(scene, self.value)
+
+
+class Noise:
+    """Random disparities from the context's seed."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        values = np.random.default_rng(context.seed).random((scene.height, scene.width), np.float32)
+        return Estimate({scene.ref: values})
+
+
+class Peeks:
+    """Returns the truth, if it is shown any."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        return Estimate({scene.ref: scene.truth[scene.ref]})
+
+
+class Writes:
+    """Writes into its input."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        scene.views[:] = 0
+        return _flat(scene, 0)
+
+
+class Exits:
+    """Ends its process."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        os._exit(7)
+
+
+class Raises:
+    """Fails, having said something."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        print("about to fail")
+        raise ArithmeticError("the third digit is missing\nand more")
+
+
+class Misshapen:
+    """Returns a map of the wrong size."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        return Estimate({scene.ref: np.zeros((3, 3), np.float32)})
+
+
+class Bare:
+    """Returns no estimate."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        return np.zeros((scene.height, scene.width), np.float32)  # type: ignore[return-value]
+
+
+class Declines:
+    """Supports nothing."""
+
+    def unsupported_reason(self, scene: Scene) -> str:
+        return "only scenes with a hundred views"
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        raise AssertionError("must not be asked")
+
+
+class Slow:
+    """Takes its time."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        time.sleep(30 if scene.width > 64 else 0)
+        return _flat(scene, 0)
+
+
+@frozen
+class Empty:
+    """Answers nowhere."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        return _flat(scene, np.nan)

@@ -1,0 +1,213 @@
+"""A comparison from end to end: methods in their own processes, stored maps, scores, tables."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import matbench
+from matbench import comparison
+from matbench.errors import UserError
+from matbench.scoring import RESULT_COLUMNS
+
+METHODS = Path(__file__).with_name("methods.py")
+SMALL = "synthetic/box[size=96x72]"
+
+
+def compare(tmp_path: Path, *algorithms: str, scene: str = SMALL, **options: object) -> pd.DataFrame:
+    return matbench.compare(list(algorithms), scene, out=tmp_path / "run", plugin=[METHODS], **options)
+
+
+def cells(tmp_path: Path) -> pd.DataFrame:
+    return pd.read_csv(tmp_path / "run" / "cells.csv", keep_default_na=False).set_index("algorithm")
+
+
+def test_results_are_tidy_and_exact(tmp_path: Path) -> None:
+    results = compare(tmp_path, "flat[value=2]")
+    assert tuple(results.columns) == RESULT_COLUMNS
+    scene = matbench.load_scene(SMALL)
+    error = np.abs(2 - scene.truth[scene.ref].astype(float)) * scene.pair_steps
+    for region, mask in scene.regions.items():
+        rows = results[results.region == region].set_index("metric")
+        known = error[mask]
+        assert (rows.pixels == mask.sum()).all()
+        assert rows.value["bad_1"] == pytest.approx(100 * np.mean(known > 1.0001))
+        assert rows.value["avg"] == pytest.approx(known.mean())
+        assert rows.value["invalid"] == 0
+    on_disk = pd.read_csv(tmp_path / "run" / "results.csv", keep_default_na=False, na_values=[""])
+    pd.testing.assert_frame_equal(on_disk[["metric", "value"]], results[["metric", "value"]])
+    assert set(results.params) == {"value=2.0"}
+
+
+def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
+    bad = ["exits", "raises", "writes", "misshapen", "bare", "peeks", "declines"]
+    results = compare(tmp_path, *bad, "flat")
+    found = cells(tmp_path)
+    assert found.status.to_dict() == {
+        "exits": "crashed",
+        "raises": "failed",
+        "writes": "failed",
+        "misshapen": "failed",
+        "bare": "failed",
+        "peeks": "failed",
+        "declines": "skipped",
+        "flat": "ok",
+    }
+    assert "exit status 7" in found.reason["exits"]
+    assert found.reason["raises"] == "ArithmeticError: the third digit is missing"
+    assert "read-only" in found.reason["writes"]
+    assert "(72, 96)" in found.reason["misshapen"]
+    assert "ndarray, not an Estimate" in found.reason["bare"]
+    assert found.reason["declines"] == "only scenes with a hundred views"
+    assert set(results.algorithm) == {"flat"}
+    log = (tmp_path / "run" / "cells" / found.cell["raises"] / "log.txt").read_text()
+    assert "about to fail" in log
+    assert "ArithmeticError" in log
+
+
+def test_an_empty_map_is_totally_bad(tmp_path: Path) -> None:
+    results = compare(tmp_path, "empty")
+    every = results[results.region == "all"].set_index("metric").value
+    assert every["total_bad_1"] == every["invalid"] == 100
+    assert every["bad_1"] == 0
+    assert np.isnan(every["avg"])
+
+
+def test_seeds_are_cells_of_their_own_and_repeat_themselves(tmp_path: Path) -> None:
+    results = compare(tmp_path, "noise", seed=[0, 1])
+    by_seed = results[(results.region == "all") & (results.metric == "avg")].set_index("seed").value
+    assert by_seed[0] != by_seed[1]
+    again = matbench.compare(["noise"], SMALL, out=tmp_path / "other", plugin=[METHODS], seed=1)
+    assert by_seed[1] == again[(again.region == "all") & (again.metric == "avg")].value.item()
+
+
+def test_the_same_request_resumes_and_computes_nothing_twice(tmp_path: Path) -> None:
+    compare(tmp_path, "flat", "exits")
+    place = tmp_path / "run" / "cells" / cells(tmp_path).cell["flat"] / "cell.json"
+    before = place.stat().st_mtime_ns
+    scores = (tmp_path / "run" / "results.csv").read_bytes()
+    started = []
+    again = comparison.prepare(["flat", "exits"], SMALL, out=tmp_path / "run", plugin=[METHODS])
+    again.run(lambda event, cell, outcome: started.append(cell.method.algorithm) if event == "start" else None)
+    again.tables()
+    assert started == ["exits"]  # what failed is tried again
+    assert place.stat().st_mtime_ns == before
+    assert (tmp_path / "run" / "results.csv").read_bytes() == scores
+
+
+def test_changed_code_is_computed_anew(tmp_path: Path) -> None:
+    plugin = tmp_path / "mine.py"
+    code = METHODS.read_text()
+    plugin.write_text(code)
+    first = matbench.compare("flat", SMALL, out=tmp_path / "run", plugin=[plugin])
+    plugin.write_text(
+        code.replace("np.full((scene.height, scene.width), value", "np.full((scene.height, scene.width), value + 3")
+    )
+    second = matbench.compare("flat", SMALL, out=tmp_path / "run", plugin=[plugin])
+    assert not np.allclose(first.value, second.value, equal_nan=True)
+
+
+def test_a_folder_with_another_plan_is_left_alone(tmp_path: Path) -> None:
+    compare(tmp_path, "flat")
+    before = {p: p.stat().st_mtime_ns for p in (tmp_path / "run").rglob("*")}
+    with pytest.raises(UserError, match="holds a different plan"):
+        compare(tmp_path, "flat[value=3]")
+    assert {p: p.stat().st_mtime_ns for p in (tmp_path / "run").rglob("*")} == before
+
+
+def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "thesis.tex").write_text("x")
+    with pytest.raises(UserError, match="not empty and holds no run"):
+        compare(tmp_path, "flat")
+    assert [p.name for p in (tmp_path / "run").iterdir()] == ["thesis.tex"]
+
+
+def test_half_a_cell_is_no_cell(tmp_path: Path) -> None:
+    compare(tmp_path, "flat")
+    run = tmp_path / "run"
+    (run / "cells" / cells(tmp_path).cell["flat"] / "cell.json").write_text('{"outcome": {"sta')
+    scores = (run / "results.csv").read_bytes()
+    compare(tmp_path, "flat")
+    assert (run / "results.csv").read_bytes() == scores
+    assert cells(tmp_path).status["flat"] == "ok"
+
+
+def test_interrupted_by_the_user_and_taken_up_again(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "matbench", "compare", "-a", "flat", "slow", "--plugin", str(METHODS)]
+    line += ["-s", SMALL, "--out", str(tmp_path / "run")]
+    process = subprocess.Popen(
+        line, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
+    wait_until(lambda: any((tmp_path / "run" / "cells").glob("[0-9a-f]*")))
+    time.sleep(0.5)
+    os.killpg(process.pid, signal.SIGINT)
+    said, _ = process.communicate(timeout=30)
+    assert process.returncode == 130, said
+    assert "the same command goes on from here" in said
+    assert "Traceback" not in said
+    assert cells(tmp_path).status.to_dict() == {"flat": "ok", "slow": "interrupted"}
+
+
+def test_killed_and_taken_up_again(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "matbench", "compare", "-a", "flat", "slow", "--plugin", str(METHODS)]
+    line += ["-s", SMALL, "--out", str(tmp_path / "run")]
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    wait_until(lambda: any((tmp_path / "run" / "cells").glob("[0-9a-f]*")))
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    ready = comparison.prepare(["flat", "slow"], SMALL, out=tmp_path / "run", plugin=[METHODS])
+    assert ready.store.outcome(ready.plan.cells[0]).status == "ok"  # type: ignore[union-attr]
+    assert [c.method.algorithm for c in matbench_pending(ready)] == ["slow"]
+
+
+def matbench_pending(ready: comparison.Comparison) -> list[comparison.run.Cell]:
+    return comparison.run.pending(ready.plan, ready.store, record=False)
+
+
+def wait_until(happens: object, seconds: float = 60) -> None:
+    end = time.monotonic() + seconds
+    while not happens():  # type: ignore[operator]
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.05)
+
+
+def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import matbench\n"
+        "print('once')\n"
+        f"table = matbench.compare('flat', {SMALL!r}, out={str(tmp_path / 'run')!r}, plugin=[{str(METHODS)!r}])\n"
+        "print(len(table))\n"
+    )
+    said = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120, check=True).stdout
+    assert said.split() == ["once", str(5 * 15)]
+
+
+def test_the_plan_on_disk_holds_no_code_and_reads_back(tmp_path: Path) -> None:
+    ready = comparison.prepare(["flat"], SMALL, out=tmp_path / "run", plugin=[METHODS])
+    assert ready.store.plan() == ready.plan
+    plan = json.loads((tmp_path / "run" / "plan.json").read_text())
+    assert plan["request"]["scenes"] == [SMALL]
+
+
+@pytest.mark.parametrize("damage", ["[]", "{}", '{"request": 3}', "nonsense", '{"cells": [{"key": "../../x"}]}'])
+def test_a_hostile_plan_is_refused(tmp_path: Path, damage: str) -> None:
+    ready = comparison.prepare(["flat"], SMALL, out=tmp_path / "run", plugin=[METHODS])
+    (tmp_path / "run" / "plan.json").write_text(damage)
+    with pytest.raises(UserError):
+        ready.store.plan()
+
+
+def test_timings_and_memory_are_measured(tmp_path: Path) -> None:
+    compare(tmp_path, "flat")
+    row = cells(tmp_path).loc["flat"]
+    assert 0 < float(row.seconds) < 5
+    assert 10 < float(row.peak_mb) < 2000

@@ -1,0 +1,63 @@
+"""What the README shows runs as it stands."""
+
+import re
+import shlex
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+README = Path(__file__).parent.parent / "README.md"
+if not README.exists():
+    pytest.skip("no README beside the tests", allow_module_level=True)
+TEXT = README.read_text()
+CODE = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+LINES = re.findall(r"^    (matbench .*)$", TEXT, re.MULTILINE)
+
+
+def matbench(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    tokens = [sys.executable, "-m", *shlex.split(line)]
+    return subprocess.run(tokens, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+def test_the_method_of_ten_lines_competes(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(CODE[0])
+    line = next(line for line in LINES if "--plugin mine.py" in line)
+    done = matbench(line.replace("synthetic/*", "synthetic/box[size=96x72]"), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "mine[share=0.2]" in done.stdout
+
+
+def test_the_python_code_runs(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(CODE[1])
+    line = [sys.executable, "script.py"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "okutomi_kanade" in done.stdout
+    assert (tmp_path / "runs/two-methods/report.html").exists()
+
+
+@pytest.mark.parametrize("line", [line for line in LINES if "--data" in line])
+def test_the_lines_on_real_scenes_are_understood(line: str, data_root: Path, tmp_path: Path) -> None:
+    from matbench import comparison
+
+    tokens = shlex.split(line.replace("DIR", str(data_root)))
+    scenes = [value for flag, value in pairwise(tokens) if flag == "-s"]
+    ready = comparison.prepare(["sgbm"], scenes, data=data_root, out=tmp_path / "run")
+    assert len(ready.scenes) >= len(scenes)
+
+
+@pytest.mark.parametrize("line", [line for line in LINES if "--data" not in line and "mine.py" not in line])
+def test_the_other_lines_name_what_exists(line: str, tmp_path: Path) -> None:
+    from matbench import comparison
+
+    tokens = shlex.split(line)
+    if tokens[1] != "compare":
+        assert tokens[1] in ("list", "view")
+        return
+    after = list(pairwise(tokens))
+    chosen = [value for flag, value in after if flag == "-a"] or None
+    scenes = [value for flag, value in after if flag == "-s"] or None
+    assert comparison.prepare(chosen, scenes, out=tmp_path / "run").plan.cells

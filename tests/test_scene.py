@@ -1,0 +1,101 @@
+"""Scene, range and choice of views."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from matbench.scene import Range, Scene, SceneError
+
+
+def make(n: int = 9, ref: int = 2, pair_steps: float = 4) -> Scene:
+    rng = np.random.default_rng(0)
+    return Scene(
+        "a",
+        rng.integers(0, 256, (n, 4, 5, 3), np.uint8),
+        tuple(str(i) for i in range(n)),
+        ref,
+        Range(-1, 3),
+        {ref: np.array([[1.5, np.nan, 2, 3, 0]] * 4, np.float32)},
+        pair_steps,
+        {"all": np.ones((4, 5), bool)},
+    )
+
+
+def test_choosing_views_rescales_disparities_truth_and_pair() -> None:
+    scene = make()
+    chosen = scene.choose([0, 2, 4, 6, 8])
+    assert (chosen.n, chosen.ref, chosen.pair_steps, chosen.labels) == (5, 1, 2, ("0", "2", "4", "6", "8"))
+    assert chosen.disparities == Range(-2, 6)
+    np.testing.assert_array_equal(chosen.truth[1], scene.truth[2] * 2)
+    np.testing.assert_array_equal(chosen.views, scene.views[::2])
+    assert chosen.regions["all"] is scene.regions["all"]
+
+
+@pytest.mark.parametrize("indices", [[2], [], [0, 1, 3], [4, 2, 0], [2, 2], [0, 1], [2, 11], [-1, 2]])
+def test_impossible_choices_are_refused(indices: list[int]) -> None:
+    with pytest.raises(SceneError) as error:
+        make().choose(indices)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("n", "ref", "count", "views"),
+    [
+        (5, 2, 4, (1, 2, 3, 4)),  # Tsukuba col2-5
+        (7, 1, 4, (0, 1, 2, 3)),  # Rocks1 view0-3
+        (9, 2, 4, (0, 2, 4, 6)),  # Teddy im0, 2, 4, 6
+        (9, 2, 9, tuple(range(9))),
+        (9, 2, 20, tuple(range(9))),
+        (2, 1, 4, (0, 1)),
+        (9, 2, 2, (2, 8)),
+    ],
+)
+def test_the_widest_choice_is_that_of_the_paper(n: int, ref: int, count: int, views: tuple[int, ...]) -> None:
+    assert make(n, ref).widest(count) == views
+
+
+def test_arrays_are_read_only_and_detached_from_the_caller() -> None:
+    views = np.zeros((2, 3, 3, 3), np.uint8)
+    scene = Scene("a", views, ("0", "1"), 0, Range(0, 1), {}, 1)
+    views[:] = 7
+    assert scene.views.max() == 0
+    with pytest.raises(ValueError, match="read-only"):
+        scene.views[0] = 1
+
+
+def test_digests_follow_pixels_and_truth_apart() -> None:
+    scene = make()
+    other_truth = evolve(scene, truth={2: np.zeros((4, 5), np.float32)})
+    other_pixels = evolve(scene, views=255 - scene.views)
+    assert (scene.digest, scene.truth_digest) == (make().digest, make().truth_digest)
+    assert other_truth.digest == scene.digest
+    assert other_truth.truth_digest != scene.truth_digest
+    assert other_pixels.digest != scene.digest
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"views": np.zeros((1, 4, 5, 3), np.uint8)},
+        {"views": np.zeros((9, 4, 5), np.uint8)},
+        {"views": np.zeros((9, 4, 5, 3), np.float32)},
+        {"views": np.zeros((9, 0, 5, 3), np.uint8)},
+        {"labels": ("a",)},
+        {"ref": 9},
+        {"pair_steps": 0.0},
+        {"pair_steps": float("nan")},
+        {"truth": {2: np.zeros((4, 4), np.float32)}},
+        {"truth": {11: np.zeros((4, 5), np.float32)}},
+        {"regions": {"all": np.zeros((4, 5), np.uint8)}},
+        {"visible": {0: np.zeros((4, 5), bool)}},
+    ],
+)
+def test_contradictions_are_refused(change: dict[str, object]) -> None:
+    with pytest.raises(SceneError):
+        evolve(make(), **change)
+
+
+@pytest.mark.parametrize("bounds", [(1, 0), (0, float("inf")), (float("nan"), 1)])
+def test_empty_or_unbounded_ranges_are_refused(bounds: tuple[float, float]) -> None:
+    with pytest.raises(SceneError):
+        Range(*bounds)

@@ -1,0 +1,129 @@
+"""Selectors and typed parameters."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import pytest
+from attrs import field, frozen, validators
+from hypothesis import given
+from hypothesis import strategies as st
+
+from matbench.errors import UserError
+from matbench.spec import Spec, build, changed, expand, parameters, parse, text, values_of
+
+
+@frozen
+class Sample:
+    window: int = field(default=5, validator=validators.ge(1))
+    sigma: float = 2.5
+    pairs: Literal["all", "consecutive"] = "consecutive"
+    fill: bool = True
+
+    presets = {"paper": {"window": 3, "fill": False}}  # noqa: RUF012
+
+
+def test_a_bare_name_has_no_options() -> None:
+    assert parse("sgbm") == [Spec("sgbm")]
+
+
+def test_commas_give_every_combination_in_order() -> None:
+    specs = parse("materiality[pairs=all,consecutive binarization=plane,volume]")
+    assert [str(s) for s in specs] == [
+        "materiality[pairs=all binarization=plane]",
+        "materiality[pairs=all binarization=volume]",
+        "materiality[pairs=consecutive binarization=plane]",
+        "materiality[pairs=consecutive binarization=volume]",
+    ]
+
+
+def test_brackets_are_read_before_patterns_and_slices() -> None:
+    assert parse("middlebury2003/t*[views=0:9:2 size=half]") == [
+        Spec("middlebury2003/t*", {"views": "0:9:2", "size": "half"})
+    ]
+
+
+def test_commas_outside_brackets_separate_selectors() -> None:
+    assert [s.name for s in expand(["a,b[x=1,2]", "a"])] == ["a", "b", "b"]
+
+
+@pytest.mark.parametrize(
+    "bad", ["", "a[", "a]b", "a[x]", "a[=1]", "a[x=]", "a[x=1,]", "a[x=1][y=2]", "a b", "a[x=1 x=2]"]
+)
+def test_malformed_selectors_are_refused_in_one_line(bad: str) -> None:
+    with pytest.raises(UserError) as error:
+        parse(bad)
+    assert "\n" not in str(error.value)
+
+
+@given(st.text(max_size=30))
+def test_any_text_is_read_or_refused(selector: str) -> None:
+    try:
+        specs = parse(selector)
+    except UserError:
+        return
+    assert all(spec.name for spec in specs)
+
+
+def test_written_values_become_typed_ones() -> None:
+    sample = build("sample", Sample, {"window": "7", "sigma": "1e-3", "pairs": "all", "fill": "no"})
+    assert sample == Sample(7, 1e-3, "all", False)
+
+
+def test_values_survive_being_stored_and_built_again() -> None:
+    sample = Sample(9, 4.0, "all", False)
+    assert build("sample", Sample, values_of(sample)) == sample
+
+
+def test_only_changed_parameters_name_a_method() -> None:
+    assert text(changed(Sample(fill=False, sigma=3.0))) == "sigma=3.0 fill=false"
+    assert changed(Sample()) == {}
+
+
+def test_a_preset_is_a_start_that_options_override() -> None:
+    assert build("sample", Sample, {"preset": "paper", "fill": "true"}) == Sample(3, fill=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"windw": "3"}, "unknown parameter of sample 'windw': did you mean 'window'?"),
+        ({"window": "three"}, "sample: window=three is not a whole number"),
+        ({"window": "2.5"}, "sample: window=2.5 is not a whole number"),
+        ({"window": 2.5}, "sample: window=2.5 is not a whole number"),
+        ({"fill": "perhaps"}, "sample: fill=perhaps is not true or false"),
+        ({"pairs": "some"}, "sample: pairs=some is not all or consecutive"),
+        ({"sigma": "wide"}, "sample: sigma=wide is not a number"),
+        ({"preset": "best"}, "unknown preset of sample 'best'"),
+        ({"window": "0"}, "sample: 'window' must be >= 1: 0"),
+    ],
+)
+def test_wrong_parameters_are_named_with_what_is_possible(options: dict[str, object], said: str) -> None:
+    with pytest.raises(UserError) as error:
+        build("sample", Sample, options)
+    assert str(error.value).startswith(said)
+
+
+def test_dataclasses_and_plain_classes_have_parameters_too() -> None:
+    @dataclass(frozen=True)
+    class Data:
+        window: int = 3
+
+    class Plain:
+        def __init__(self, window: int = 3) -> None:
+            self.window = window
+
+    class Nothing:
+        pass
+
+    assert build("data", Data, {"window": "4"}).window == 4
+    assert build("plain", Plain, {"window": "4"}).window == 4
+    assert parameters(Nothing) == {}
+
+
+def test_a_parameter_without_default_must_be_given() -> None:
+    class Plain:
+        def __init__(self, window: int) -> None:
+            self.window = window
+
+    with pytest.raises(UserError, match="window must be given"):
+        build("plain", Plain, {})
