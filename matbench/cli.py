@@ -96,11 +96,6 @@ def compare(
     report = ready.report(results, cells)
     _print_tables(results, cells, metric, console)
     failed = cells[~cells["status"].isin(["ok", "skipped"])]
-    for row in failed.itertuples():
-        name = f"{row.algorithm}[{row.params}]" if row.params else row.algorithm
-        console.print(
-            f"{row.status}: {name} on {row.scene}: {row.reason}", markup=False, highlight=False, soft_wrap=True
-        )
     for what, path in (("scores", ready.folder / "results.csv"), ("report", report)):
         console.print(f"{what}: {path}", markup=False, highlight=False, soft_wrap=True)
     if record:

@@ -103,9 +103,8 @@ def _finish(pool: ProcessPool, job: Job, store: Store) -> Outcome:
                     raise
     except ProcessExpired as error:
         code = f"exit status {error.exitcode}" if error.exitcode is not None else "no exit status"
-        outcome = Outcome("crashed", reason=f"the method ended its process ({code})")
+        crashed = Outcome("crashed", reason=f"the method ended its process ({code})")
         with store.building(job.cell) as draft:
-            write_cell(draft, job.cell, outcome)
-        return outcome
-    outcome = store.outcome(job.cell)
-    return outcome or Outcome("failed", reason="the cell's process left no result")
+            write_cell(draft, job.cell, crashed)
+        return crashed
+    return store.outcome(job.cell) or Outcome("failed", reason="the cell's process left no result")

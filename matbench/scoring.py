@@ -68,7 +68,7 @@ def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFra
 
 def cells(plan: Plan, store: Store) -> pd.DataFrame:
     """One row for each cell of the plan: what became of it and what it cost (`CELL_COLUMNS`)."""
-    rows = []
+    rows: list[tuple[object, ...]] = []
     for cell in plan.cells:
         outcome = store.outcome(cell)
         head = (cell.method.algorithm, cell.method.changed, cell.scene, cell.seed)

@@ -86,7 +86,7 @@ def test_a_failed_cell_is_status_1_and_says_why(capsys: pytest.CaptureFixture[st
         capsys, "compare", "-a", "flat", "raises", "--plugin", str(METHODS), "-s", SMALL, "--out", str(tmp_path / "r")
     )
     assert status == 1
-    assert f"failed: raises on {SMALL}: ArithmeticError: the third digit is missing" in out
+    assert f"failed  raises on {SMALL} ArithmeticError: the third digit is missing" in out
 
 
 def test_missing_real_scenes_are_one_line(

@@ -1,0 +1,170 @@
+"""Scores of a disparity map: shares in per cent, errors in pixels of the field's pair."""
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+Errors = NDArray[np.float64]
+
+TIE = 1e-4
+"""Px. An error this little above a threshold is a tie, and a tie is not bad."""
+
+
+@frozen
+class Metric:
+    """A number for the pixels of a region, and in words what it is.
+
+    Parameters
+    ----------
+    name
+        How tables and the command line call it.
+    unit
+        ``"%"`` of the region's pixels, or ``"px"`` of the field's pair.
+    better
+        Which direction is better.
+    about
+        What it is, in one line.
+    compute
+        (pixels,) absolute errors in px of the pair, NaN where the method has no answer, at least
+        one pixel -> the value; NaN where it has none. It must not write to its argument.
+    """
+
+    name: str
+    unit: Literal["%", "px"]
+    better: Literal["lower", "higher"]
+    about: str
+    compute: Callable[[Errors], float]
+
+
+def error_map(estimate: NDArray[np.float32], truth: NDArray[np.float32], pair_steps: float) -> Errors:
+    """Absolute error of every pixel.
+
+    Parameters
+    ----------
+    estimate, truth
+        (H, W) float32, pixels per view step; NaN or infinite where there is none.
+    pair_steps
+        View steps in the field's pair.
+
+    Returns
+    -------
+    (H, W) float64, pixels of the pair; NaN where either is unknown.
+    """
+    known = np.isfinite(estimate) & np.isfinite(truth)
+    error = np.full(truth.shape, np.nan)
+    error[known] = np.abs(estimate[known].astype(np.float64) - truth[known].astype(np.float64)) * pair_steps
+    return error
+
+
+def _answered(errors: Errors) -> Errors:
+    return errors[~np.isnan(errors)]
+
+
+def _percent(mask: NDArray[np.bool_]) -> float:
+    return 100.0 * float(mask.mean())
+
+
+def bad(errors: Errors, threshold: float) -> float:
+    """Per cent of pixels answered with an error above the threshold; ties are not bad."""
+    return _percent(errors > threshold + TIE)
+
+
+def total_bad(errors: Errors, threshold: float) -> float:
+    """Per cent of pixels that are bad or not answered."""
+    return _percent(~(errors <= threshold + TIE))
+
+
+def invalid(errors: Errors) -> float:
+    """Per cent of pixels not answered."""
+    return _percent(np.isnan(errors))
+
+
+def average(errors: Errors) -> float:
+    """Mean error of answered pixels; NaN if there are none."""
+    answered = _answered(errors)
+    return float(answered.mean()) if answered.size else float("nan")
+
+
+def root_mean_square(errors: Errors) -> float:
+    """Root mean square error of answered pixels; NaN if there are none."""
+    answered = _answered(errors)
+    return float(np.sqrt(np.mean(answered**2))) if answered.size else float("nan")
+
+
+def quantile(errors: Errors, share: float) -> float:
+    """The error that `share` of the answered pixels do not exceed, linear between order statistics."""
+    answered = _answered(errors)
+    return float(np.quantile(answered, share)) if answered.size else float("nan")
+
+
+_THRESHOLDS = (0.5, 1, 2, 4)
+_QUANTILES = (50, 90, 95, 99)
+
+METRICS: tuple[Metric, ...] = (
+    *(
+        Metric(f"bad_{t:g}", "%", "lower", f"answered, error above {t:g} px of the pair", partial(bad, threshold=t))
+        for t in _THRESHOLDS
+    ),
+    *(
+        Metric(
+            f"total_bad_{t:g}",
+            "%",
+            "lower",
+            f"not answered, or error above {t:g} px of the pair",
+            partial(total_bad, threshold=t),
+        )
+        for t in _THRESHOLDS
+    ),
+    Metric("invalid", "%", "lower", "not answered", invalid),
+    Metric("avg", "px", "lower", "mean error of answered pixels", average),
+    Metric("rms", "px", "lower", "root mean square error of answered pixels", root_mean_square),
+    *(
+        Metric(
+            f"a{q}",
+            "px",
+            "lower",
+            f"error not exceeded by {q} % of answered pixels",
+            partial(quantile, share=q / 100),
+        )
+        for q in _QUANTILES
+    ),
+)
+
+
+def score(
+    estimate: NDArray[np.float32],
+    truth: NDArray[np.float32],
+    mask: NDArray[np.bool_],
+    pair_steps: float,
+    metrics: Iterable[Metric] = METRICS,
+) -> dict[str, float]:
+    """Every metric over one region.
+
+    Parameters
+    ----------
+    estimate, truth
+        (H, W) float32, pixels per view step. A NaN or infinite estimate is no answer; pixels
+        without truth never count.
+    mask
+        (H, W) bool, the region.
+    pair_steps
+        View steps in the field's pair.
+
+    Returns
+    -------
+    Name -> value, in the order of `metrics`; all NaN if no pixel of the region has truth.
+
+    Raises
+    ------
+    ValueError
+        If the three arrays differ in shape.
+    """
+    if not estimate.shape == truth.shape == mask.shape:
+        raise ValueError(f"estimate is {estimate.shape}, truth {truth.shape}, region {mask.shape}: they must agree")
+    errors = error_map(estimate, truth, pair_steps)[mask & np.isfinite(truth)]
+    errors.setflags(write=False)
+    return {metric.name: metric.compute(errors) if errors.size else float("nan") for metric in metrics}

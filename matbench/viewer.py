@@ -1,0 +1,81 @@
+"""Opening a recording, in the native viewer or in a browser."""
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from contextlib import closing
+from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import quote
+
+from matbench.errors import UserError
+
+
+def view(path: Path, web: bool = False) -> None:
+    """Show a recording until the viewer is closed or Ctrl-C is typed.
+
+    Parameters
+    ----------
+    path
+        A recording.
+    web
+        Serve it to a browser on this machine, and print the address, instead of opening a window.
+
+    Raises
+    ------
+    UserError
+        If there is no such file, no display, or the viewer cannot start.
+    """
+    if not path.is_file():
+        raise UserError(f"no recording {str(path)!r}: `matbench compare --record` writes them")
+    if not web and sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise UserError("no display to open the native viewer on: add --web to view the recording in a browser")
+    ports = _free_port(), _free_port()
+    command = [str(_executable()), str(path), "--port", str(ports[0])]
+    if web:
+        # not on all interfaces, which is its default
+        command += ["--web-viewer", "--bind", "127.0.0.1", "--web-viewer-port", str(ports[1])]
+    quiet = {"RUST_LOG": "error", **os.environ}
+    with subprocess.Popen(command, env=quiet) as viewer:  # noqa: S603
+        try:
+            if web and _answers(ports[1], viewer):
+                source = quote(f"rerun+http://127.0.0.1:{ports[0]}/proxy", safe="")
+                print(f"http://127.0.0.1:{ports[1]}/?url={source}  (Ctrl-C ends)", flush=True)
+            status = viewer.wait()
+        except KeyboardInterrupt:
+            viewer.terminate()
+            return
+    if status != 0:
+        advice = "" if web else "; add --web to view the recording in a browser"
+        raise UserError(f"the rerun viewer ended with status {status}{advice}")
+
+
+def _executable() -> Path:
+    """The viewer inside the rerun-sdk package, run directly so that it can be ended."""
+    package = find_spec("rerun_cli")
+    folders = [Path(folder) for folder in (package and package.submodule_search_locations) or ()]
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
+    for folder in folders:
+        for place in (folder / name, folder / "Rerun.app" / "Contents" / "MacOS" / "Rerun"):
+            if place.is_file():
+                return place
+    raise UserError("rerun-sdk is installed without its viewer: `pip install --force-reinstall rerun-sdk`")
+
+
+def _free_port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _answers(port: int, viewer: subprocess.Popen[bytes], seconds: float = 20.0) -> bool:
+    """Wait until the web viewer can be reached; False if it ended or took too long."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and viewer.poll() is None:
+        with closing(socket.socket()) as probe:
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                return True
+        time.sleep(0.05)
+    return False

@@ -1,0 +1,62 @@
+"""What a report is made of: everything that the page shows, as one frozen value."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pandas as pd
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from matbench.scene import Scene
+
+Key = tuple[str, str, str, int]
+"""Algorithm, parameters, scene and seed: the names of a cell."""
+
+Maps = Mapping[Key, NDArray[np.float32] | None] | Callable[[str, str, str, int], NDArray[np.float32] | None]
+
+
+@frozen(eq=False)
+class Report:
+    """A finished run, ready to be looked at.
+
+    Parameters
+    ----------
+    title
+        What the run is called.
+    command
+        The line that made it.
+    results
+        Tidy scores: algorithm, params, scene, view, seed, region, metric, value, unit, pixels.
+    cells
+        One row a cell: algorithm, params, scene, seed, status, seconds, peak_mb, reason.
+    maps
+        Cell -> (H, W) disparity of the reference view, pixels per view step, NaN = no answer; None
+        where there is none. A function of the four names, so that maps are read one at a time, or
+        a mapping.
+    scenes
+        Name -> scene. A scene that is not among them has no pictures.
+    facts
+        What it ran on, as shown: ``{"numpy": "2.4.1", "processor": ...}``.
+    higher
+        Metrics of which more is better; of all others, less is.
+    """
+
+    title: str
+    command: str
+    results: pd.DataFrame
+    cells: pd.DataFrame
+    maps: Maps = field(factory=dict)
+    scenes: Mapping[str, Scene] = field(factory=dict)
+    facts: Mapping[str, str] = field(factory=dict)
+    higher: frozenset[str] = frozenset()
+
+    def disparity(self, algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
+        """(H, W) disparity map of a cell, or None; also None where its size is not the scene's."""
+        if isinstance(self.maps, Mapping):
+            found = self.maps.get((algorithm, params, scene, seed))
+        else:
+            found = self.maps(algorithm, params, scene, seed)
+        known = self.scenes.get(scene)
+        if found is None or known is None or found.shape != (known.height, known.width):
+            return None
+        return found

@@ -1,0 +1,192 @@
+"""The tables of a run: whatever shows numbers takes them from here, so that all agree."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import pandas as pd
+from attrs import frozen
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+METRIC, REGION = "total_bad_1", "all"
+REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
+FEW = 6  # fewer shared scenes than this carry no conclusion
+
+_NO_SCENES: frozenset[str] = frozenset()
+
+
+def label(algorithm: str, params: str) -> str:
+    """How a method is called everywhere.
+
+    >>> label("sgbm", ""), label("sgbm", "fill=False")
+    ('sgbm', 'sgbm[fill=False]')
+    """
+    return f"{algorithm}[{params}]" if params else algorithm
+
+
+def labelled(frame: pd.DataFrame) -> pd.DataFrame:
+    """`results` or `cells` with one more column, `method`; as good when read back from a file."""
+    if "method" in frame:
+        return frame
+    out = frame.copy()
+    out["params"] = out["params"].fillna("").astype(str)
+    out["method"] = [label(a, p) for a, p in zip(out["algorithm"], out["params"], strict=True)]
+    if "seed" not in out:
+        out["seed"] = 0
+    names = out.columns.intersection(["method", "scene", "region", "metric", "unit", "status"])
+    return out.astype(dict.fromkeys(names, object))
+
+
+@frozen
+class Shared:
+    """Which methods can be compared on which scenes.
+
+    Parameters
+    ----------
+    methods
+        All of them, in the order of the plan.
+    asked
+        Every scene of the plan.
+    has
+        Method -> the scenes on which all its cells are ok and scored.
+    scenes
+        The scenes shared by the methods that have the most; means are over these.
+    """
+
+    methods: tuple[str, ...]
+    asked: tuple[str, ...]
+    has: Mapping[str, frozenset[str]]
+    scenes: tuple[str, ...]
+
+    def is_ranked(self, method: str) -> bool:
+        """Only who has every shared scene is compared with the others."""
+        return bool(self.scenes) and self.has[method].issuperset(self.scenes)
+
+    def counted(self, method: str) -> tuple[str, ...]:
+        """The scenes that a method's means are over: the shared ones, or its own if it lacks some."""
+        return self.scenes if self.is_ranked(method) else tuple(s for s in self.asked if s in self.has[method])
+
+
+def shared(results: pd.DataFrame, cells: pd.DataFrame) -> Shared:
+    """Find the scenes that the methods share: a cell that is not ok keeps its method off its scene."""
+    scored, planned = labelled(results), labelled(cells)
+    methods = tuple(dict.fromkeys([*planned["method"].unique(), *scored["method"].unique()]))
+    asked = tuple(dict.fromkeys([*planned["scene"].unique(), *scored["scene"].unique()]))
+    done = scored[["method", "scene"]].drop_duplicates()
+    pairs = set(zip(done["method"], done["scene"], strict=True))
+    bad = planned[planned["status"] != "ok"]
+    pairs -= set(zip(bad["method"], bad["scene"], strict=True))
+    has = {m: frozenset(s for s in asked if (m, s) in pairs) for m in methods}
+    most = max((len(h) for h in has.values()), default=0)
+    common = frozenset.intersection(*(h for h in has.values() if len(h) == most)) if has else _NO_SCENES
+    return Shared(methods, asked, has, tuple(s for s in asked if s in common))
+
+
+def regions(results: pd.DataFrame) -> list[str]:
+    """The regions that were scored, the field's own first."""
+    found = list(results["region"].unique())
+    return [r for r in REGIONS if r in found] + [r for r in found if r not in REGIONS]
+
+
+def metrics(results: pd.DataFrame) -> dict[str, str]:
+    """Metric -> unit, in the order of the results."""
+    found = results[["metric", "unit"]].drop_duplicates("metric")
+    return dict(zip(found["metric"], found["unit"].fillna(""), strict=True))
+
+
+def per_scene(results: pd.DataFrame, region: str, metric: str) -> pd.DataFrame:
+    """Scores of one metric in one region: scenes x methods, the mean over seeds, NaN where there is none.
+
+    A seed without a value leaves its scene without one: it is not averaged away.
+    """
+    scored = labelled(results)
+    rows = scored[(scored["region"] == region) & (scored["metric"] == metric)]
+    groups = rows.assign(value=rows["value"].astype(float)).groupby(["scene", "method"])["value"]
+    means = groups.mean().where(groups.count() == groups.size()).unstack("method")
+    scenes, methods = scored["scene"].unique(), scored["method"].unique()
+    return means.reindex(index=scenes, columns=methods).rename_axis(index="scene", columns="method")
+
+
+def means(results: pd.DataFrame, scope: Shared, region: str, metric: str) -> pd.Series:
+    """Method -> mean over the scenes it is counted on; NaN where one of them has no value.
+
+    Scenes in which the region is empty, so that no method has a value, do not count.
+    """
+    table = per_scene(results, region, metric).reindex(index=list(scope.asked), columns=list(scope.methods))
+    filled = table.notna().any(axis=1)
+    chosen = {m: [s for s in scope.counted(m) if filled[s]] for m in scope.methods}
+    return pd.Series({m: table.loc[chosen[m], m].mean(skipna=False) for m in scope.methods}, dtype=float)
+
+
+def seconds(cells: pd.DataFrame, scope: Shared) -> pd.Series:
+    """Method -> mean wall time per scene, over the same scenes as its scores."""
+    planned = labelled(cells)
+    good = planned[planned["status"] == "ok"]
+    table = good.assign(seconds=good["seconds"].astype(float)).groupby(["scene", "method"])["seconds"].mean()
+    wide = table.unstack("method").reindex(index=list(scope.asked), columns=list(scope.methods))
+    return pd.Series({m: wide.loc[list(scope.counted(m)), m].mean(skipna=False) for m in scope.methods}, dtype=float)
+
+
+def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
+    """Methods x means, best first by `metric` in `all`.
+
+    Parameters
+    ----------
+    results, cells
+        The two tables of a run.
+    metric
+        What is shown for every region.
+
+    Returns
+    -------
+    Index: the methods' labels. Columns: ``<metric> <region>`` for the five regions, ``avg all``
+    (pixels of the pair), ``seconds``, then ``scenes`` (how many the means are over), ``asked``
+    (how many it was asked for) and ``ranked``. Ranked methods share their scenes; a method that
+    lacks one of these has means over its own scenes and is not ranked.
+    """
+    scope = shared(results, cells)
+    columns = {f"{metric} {region}": means(results, scope, region, metric) for region in REGIONS}
+    columns["avg all"] = means(results, scope, REGION, "avg")
+    columns["seconds"] = seconds(cells, scope)
+    out = pd.DataFrame(columns, index=pd.Index(scope.methods, name="method", dtype=str), dtype=float)
+    out["scenes"] = [len(scope.counted(m)) for m in scope.methods]
+    out["asked"] = len(scope.asked)
+    out["ranked"] = pd.Series([scope.is_ranked(m) for m in scope.methods], out.index, dtype=bool)
+    order = out.assign(unranked=~out["ranked"]).sort_values(["unranked", f"{metric} {REGION}"], kind="stable")
+    return out.loc[order.index]
+
+
+def text(value: float, unit: str) -> str:
+    """A number as every table shows it.
+
+    >>> text(2.345, "%"), text(0.01234, "s"), text(float("nan"), "px")
+    ('2.35', '0.012', '–')
+    """
+    if pd.isna(value):
+        return "–"
+    if unit in ("%", "px"):
+        return f"{value:.2f}"
+    if unit == "s":
+        return f"{value:.{0 if value >= 100 else 1 if value >= 10 else 2 if value >= 1 else 3}f}"
+    return f"{value:.4g}"
+
+
+def places(values: pd.Series, unit: str, higher: bool = False) -> pd.Series:
+    """1 for the best, 2 for the second best, else 0, judged by what is shown: ties share a place.
+
+    Nothing is marked where all are equal or only one has a value.
+    """
+    sign = -1 if higher else 1
+    shown = [sign * float(text(v, unit)) if pd.notna(v) else float("nan") for v in values]
+    if len({v for v in shown if v == v}) < 2:
+        return pd.Series(0, values.index)
+    better = [sum(other < v for other in shown) if v == v else len(shown) for v in shown]
+    return pd.Series([b + 1 if b < 2 else 0 for b in better], values.index)
+
+
+def terminal(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC) -> "list[Table]":
+    """The summary, the scenes one by one and what went wrong, for a terminal of 80 columns or more."""
+    from matbench.reports.terminal import tables
+
+    return tables(results, cells, metric)

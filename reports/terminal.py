@@ -1,0 +1,117 @@
+"""The tables of a run in a terminal: 80 columns are enough, names are never read as markup."""
+
+import pandas as pd
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from matbench.reports.tables import (
+    FEW,
+    METRIC,
+    REGION,
+    REGIONS,
+    Shared,
+    labelled,
+    metrics,
+    per_scene,
+    places,
+    shared,
+    summary,
+)
+from matbench.reports.tables import text as shown
+
+WIDTH = 80
+_PADDING = 2
+
+
+def tables(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC) -> list[Table]:
+    """The summary, the scenes one by one and what went wrong; empty tables are left out."""
+    scope = shared(results, cells)
+    out = []
+    if scope.methods:
+        out.append(_summary(results, cells, scope, metric))
+    if len(results):
+        out += _scenes(results, cells, scope, metric)
+    bad = labelled(cells)
+    bad = bad[bad["status"] != "ok"]
+    if len(bad):
+        out.append(_bad(bad))
+    return out
+
+
+def _plain(title: str) -> Table:
+    return Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+
+
+def _number(value: float, unit: str, place: int) -> Text:
+    return Text(shown(value, unit), style="bold" if place == 1 else "")
+
+
+def _summary(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str) -> Table:
+    rows, unit = summary(results, cells, metric), metrics(results).get(metric, "%")
+    count = f"{len(scope.scenes)} of {len(scope.asked)} scenes"
+    hint = "; too few scenes to conclude" if len(scope.scenes) < FEW else ""
+    table = _plain(f"{metric} ({unit}) by region, mean over {count}{hint}")
+    table.add_column("#", justify="right", no_wrap=True)
+    table.add_column("method", overflow="fold", min_width=12)
+    heads = {f"{metric} {r}": (r.replace("textureless", "texture-\nless") + f"\n{unit}", unit) for r in REGIONS}
+    heads |= {"avg all": ("avg\nall\npx", "px"), "seconds": ("time\ns", "s")}
+    for head, _ in heads.values():
+        table.add_column(Text(head), justify="right", no_wrap=True, vertical="top")
+    marks = {c: places(rows.loc[rows["ranked"], c], u) for c, (_, u) in heads.items()}
+    for number, (method, row) in enumerate(rows.iterrows(), 1):
+        name = Text(str(method))
+        if not row["ranked"]:
+            name.append(f"\nnot ranked: {row['scenes']} of {row['asked']} scenes", style="italic")
+        values = [_number(row[c], u, marks[c].get(method, 0)) for c, (_, u) in heads.items()]
+        table.add_row(str(number), name, *values, style="" if row["ranked"] else "dim")
+    return table
+
+
+def _headings(methods: list[str], numbers: dict[str, int], room: int) -> list[str]:
+    """Names broken after underscores where they fit side by side, else the summary's numbers."""
+    names = [m.replace("_", "_\n") for m in methods]
+    fits = sum(max(len(part) for part in n.split("\n")) + _PADDING for n in names) <= room
+    return names if fits else [f"#{numbers[m]}" for m in methods]
+
+
+def _scenes(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str) -> list[Table]:
+    """Scenes x methods, in as many tables as it takes to stay within `WIDTH`."""
+    methods = [str(m) for m in summary(results, cells, metric).index]
+    unit = metrics(results).get(metric, "%")
+    numbers = {m: i for i, m in enumerate(methods, 1)}
+    values = per_scene(results, REGION, metric).reindex(index=list(scope.asked), columns=methods)
+    first = min(max((len(s) for s in scope.asked), default=0), 28)
+    heads = _headings(methods, numbers, WIDTH - first)
+    at_once = len(methods) if not heads[0].startswith("#") else max(1, (WIDTH - first) // (7 + _PADDING))
+    bad = labelled(cells)
+    bad = bad[bad["status"] != "ok"]
+    status = {(m, s): state for m, s, state in zip(bad["method"], bad["scene"], bad["status"], strict=True)}
+    out = []
+    for start in range(0, len(methods), at_once):
+        part = methods[start : start + at_once]
+        table = _plain(f"{metric} ({unit}) in {REGION!r}, scene by scene")
+        table.add_column("scene", overflow="fold", min_width=12)
+        for head in heads[start : start + at_once]:
+            table.add_column(Text(head), justify="right", overflow="fold")
+        for scene, row in values.iterrows():
+            marks = places(row[[m for m in methods if scene in scope.has[m]]], unit)
+            shown_row = [
+                Text(status[m, str(scene)], style="italic")
+                if (m, scene) in status
+                else _number(row[m], unit, marks.get(m, 0))
+                for m in part
+            ]
+            table.add_row(Text(str(scene)), *shown_row)
+        out.append(table)
+    return out
+
+
+def _bad(bad: pd.DataFrame) -> Table:
+    table = _plain(f"{len(bad)} cell{'s' if len(bad) != 1 else ''} without a score")
+    for head in ("method", "scene", "seed", "status", "reason"):
+        table.add_column(head, overflow="fold", justify="right" if head == "seed" else "left")
+    for _, row in bad.iterrows():
+        reason = "" if pd.isna(row["reason"]) else str(row["reason"])
+        table.add_row(*(Text(str(row[c])) for c in ("method", "scene", "seed", "status")), Text(reason))
+    return table

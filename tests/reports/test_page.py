@@ -1,0 +1,155 @@
+"""The page: one file, nothing hostile gets through, its numbers are the tables' numbers."""
+
+import json
+import re
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from attrs import evolve
+
+from matbench.reports import figures, page, tables
+from matbench.reports.content import Report
+
+
+class Reader(HTMLParser):
+    """Collects tags with their attributes, and the texts of scripts and table cells."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.lasttag == "script" and self.tags[-1][0] == "script":
+            self.scripts[-1] += data
+
+
+def data_of(html: str) -> Any:
+    return json.loads(Reader(html).scripts[0], parse_constant=lambda c: pytest.fail(f"{c} is not JSON"))
+
+
+def test_one_file_without_addresses(report: Report, tmp_path: Path) -> None:
+    page.write(tmp_path / "report.html", report)
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "http:" not in html
+    assert "https:" not in html
+    for tag, attributes in Reader(html).tags:
+        assert tag not in ("link", "iframe", "object", "base")
+        for name in ("src", "href", "xlink:href"):
+            assert (attributes.get(name) or "#").startswith(("#", "data:image/webp;base64,"))
+
+
+def test_hostile_names_stay_text(report: Report) -> None:
+    html = page.render(report)
+    assert "<script>alert" not in html
+    assert len(Reader(html).scripts) == 2
+    assert {m for m, _ in Reader(html).tags if m == "script"} == {"script"}
+    assert "alert(1)" in unescape(html)
+    data = data_of(html)
+    assert "<script>alert(1)</script>[a=</script><!--]" in data["methods"]
+    for _, attributes in Reader(html).tags:
+        assert not any(name.startswith("on") for name in attributes)
+
+
+def test_numbers_are_those_of_the_tables(report: Report) -> None:
+    html = page.render(report)
+    data, rows = data_of(html), tables.summary(report.results, report.cells)
+    for method, row in rows.iterrows():
+        for region in tables.REGIONS:
+            value, shown, _ = data["means"]["total_bad_1"][region][method]
+            assert value == pytest.approx(row[f"total_bad_1 {region}"])
+            assert shown == tables.text(value, "%")
+            assert f">{shown}<" in html
+    scenes = tables.per_scene(report.results, "mine", "weight")
+    for entries, (_, row) in zip(data["scenes"]["weight"]["mine"], scenes.iterrows(), strict=True):
+        for method, (value, _, _) in zip(data["methods"], entries, strict=True):
+            assert value == pytest.approx(row[method]) if value is not None else np.isnan(row[method])
+
+
+def test_failed_cells_are_shown_and_not_ranked(report: Report) -> None:
+    html = page.render(report)
+    assert "Cells without a score" in html
+    assert "ValueError: &lt;script&gt;" in html
+    assert "not ranked: 1 of 2 scenes" in html
+    entries = data_of(html)["scenes"]["total_bad_1"]["all"][1]
+    assert entries[-1] == [None, "failed", 0]
+    assert data_of(html)["means"]["total_bad_1"]["all"]["broken[x=[1] \"'&]"][2] == 0
+
+
+def test_the_answer_is_honest(report: Report) -> None:
+    html = page.render(report)
+    words = " ".join(re.sub(r"<[^>]+>", "", unescape(html)).split())
+    assert "good has the lowest total_bad_1 in all on 2 scenes: 10.51" in words
+    assert "too few scenes to conclude" in html
+
+
+@pytest.mark.parametrize("keep_cells", [True, False])
+def test_no_results(report: Report, keep_cells: bool) -> None:
+    cells = report.cells.assign(status="failed", seconds=None) if keep_cells else report.cells.iloc[:0]
+    html = page.render(evolve(report, results=report.results.iloc[:0], cells=cells, maps={}))
+    assert "There is nothing to compare" in html
+    assert data_of(html)["units"] == {}
+
+
+def test_no_columns_but_those_promised(report: Report) -> None:
+    empty = evolve(report, results=pd.DataFrame(columns=report.results.columns), cells=report.cells.assign(extra=1))
+    assert "nothing to compare" in page.render(empty)
+
+
+def test_maps_may_be_a_function_and_scenes_unknown(report: Report) -> None:
+    called = evolve(report, maps=report.disparity)
+    assert page.render(called) == page.render(report)
+    assert page.render(evolve(report, scenes={})).count("no maps") == 2
+
+
+def decoded(uri: str) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    from base64 import b64decode
+
+    bgr = cv2.imdecode(np.frombuffer(b64decode(uri.partition(",")[2]), np.uint8), cv2.IMREAD_COLOR)
+    assert bgr is not None
+    return bgr[..., ::-1].astype(np.uint8)
+
+
+def test_no_answer_and_unknown_truth_differ_from_every_colour() -> None:
+    truth = np.array([[1, 2, np.nan, 1]], np.float32).repeat(8, axis=0)
+    answer = np.array([[1, np.nan, 2, 9]], np.float32).repeat(8, axis=0)
+    picture = decoded(figures.data_uri(figures.error_map(answer, truth, 2.0)))
+    assert (picture[:, 0] == figures.colours("magma")[0]).all()
+    assert (picture[:, 3] == figures.colours("magma")[255]).all()
+    assert (picture[:, 2] == figures.UNKNOWN).all()
+    assert set(map(tuple, picture[:, 1].tolist())) == {(196, 196, 196), (250, 250, 250)}
+
+
+def test_large_pictures_are_made_smaller() -> None:
+    assert decoded(figures.data_uri(np.zeros((300, 1024, 3), np.uint8))).shape == (150, 512, 3)
+
+
+def test_one_scale_for_a_scene(report: Report) -> None:
+    truth = next(iter(report.scenes.values())).truth[1]
+    assert figures.scale(truth, 0, 9) == (1.0, 4.0)
+    assert figures.scale(None, 0, 9) == (0, 9)
+    assert figures.scale(np.full((2, 2), 3, np.float32), 0, 9) == (2.5, 3.5)
+
+
+def test_the_figure_takes_names_literally(report: Report) -> None:
+    rows = tables.summary(report.results, report.cells)
+    rows.index = ["$x^$ \x07", "<b>&", "c"]
+    figure = figures.cost(rows, "total_bad_1 all", "%")
+    assert figure is not None
+    text = figures.svg(figure)
+    assert "$x^$ \N{REPLACEMENT CHARACTER}" in text
+    assert "&lt;b&gt;&amp;" in text
+    assert figures.cost(rows.assign(ranked=False), "total_bad_1 all", "%") is None

@@ -1,0 +1,381 @@
+"""Recordings, read back: what was told is what is in the file, and no half-written file is left."""
+
+import os
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from matbench import drawing, recording
+from matbench.algorithm import Context, Estimate, Probe
+from matbench.errors import UserError
+from matbench.recording import RecordingError, RecordingProbe, record, view
+from matbench.scene import Range, Scene
+from matbench.space import DisparitySpace, Volume, visibility
+
+ROW, PASSES = 9, 7
+
+
+def make_scene(n: int = 4, height: int = 20, width: int = 30, least: float = 0, largest: float = 7) -> Scene:
+    random = np.random.default_rng(0)
+    views = random.integers(0, 256, (n, height, width, 3), dtype=np.uint8)
+    truth = np.full((height, width), least + 2, np.float32)
+    truth[5:12, 10:20] = largest - 1
+    truth[0] = np.nan
+    known = np.isfinite(truth)
+    regions = {"all": known, "nonocc": known & (truth < largest - 1)}
+    labels = tuple(f"im{2 * i}" for i in range(n))
+    return Scene("toy/box", views, labels, 1, Range(least, largest), {1: truth}, 2.0, regions)
+
+
+class Teller:
+    """A method that makes everything up and tells all of it; it reuses its arrays, as methods may."""
+
+    def __init__(self, scene: Scene, passes: int = PASSES) -> None:
+        self.space = DisparitySpace.covering(scene.disparities, scene.n, scene.height, scene.width)
+        self.passes, random = passes, np.random.default_rng(1)
+        self.pairs = [random.random(self.space.shape, np.float32) for _ in range(scene.n - 1)]
+        self.states = [random.random(self.space.shape, np.float32) for _ in range(passes)]
+        self.slopes = [random.integers(-1, 2, self.space.shape).astype(np.float32) for _ in range(passes)]
+        shape = (scene.height, scene.width)
+        self.maps = [random.uniform(0, 7, shape).astype(np.float32) for _ in range(passes)]
+        self.answer = random.uniform(0, 7, shape).astype(np.float32)
+        self.answer[3:6, :5] = np.nan
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        views, probe = tuple(range(scene.n)), context.probe
+        reused = np.empty(self.space.shape, np.float32)
+        for i, pair in enumerate(self.pairs):
+            reused[:] = pair
+            probe.volume(f"similarity/{i}-{i + 1}", Volume(self.space, reused, views))
+        for step in range(self.passes):
+            reused[:] = self.states[step]
+            energies = {"total": 10.0 - step, "data": 9.0 - step}
+            slopes = Volume(self.space, self.slopes[step], views)
+            probe.iteration(step, energies, Volume(self.space, reused, views), slopes, self.maps[step])
+        volume = Volume(self.space, self.states[-1], views)
+        return Estimate({scene.ref: self.answer}, volume, {"total": [0.0], "late": [3.0, 2.0]})
+
+
+Row = tuple[int | None, dict[str, Any]]
+
+
+def read(path: Path) -> dict[str, list[Row]]:
+    """Entity -> (iteration or None, component -> value) in order."""
+    found: dict[str, list[Row]] = {}
+    for chunk in rr.chunk.RrdReader(path).stream():
+        assert set(chunk.timeline_names) <= {"iteration"}
+        for row in chunk.to_record_batch().to_pylist():
+            values = {name: value[0] if isinstance(value, list) and value else value for name, value in row.items()}
+            step = values.get("iteration")
+            found.setdefault(str(chunk.entity_path), []).append((step, values))
+    return {entity: sorted(rows, key=lambda row: -1 if row[0] is None else row[0]) for entity, rows in found.items()}
+
+
+def picture(values: dict[str, Any], kind: str = "Image") -> np.ndarray:
+    form = values[f"{kind}:format"]
+    data = np.asarray(values[f"{kind}:buffer"], np.uint8)
+    return data.reshape(form["height"], form["width"], -1)
+
+
+def tensor(values: dict[str, Any]) -> np.ndarray:
+    data = values["Tensor:data"]
+    inner = data["buffer"]
+    return np.asarray(inner, np.uint8).reshape(data["shape"])
+
+
+@pytest.fixture(scope="module")
+def told() -> tuple[Scene, Teller]:
+    scene = make_scene()
+    return scene, Teller(scene)
+
+
+@pytest.fixture(scope="module")
+def path(told: tuple[Scene, Teller], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    scene, teller = told
+    path = tmp_path_factory.mktemp("cell") / "recording.rrd"
+    estimate = record(path, scene, lambda probe: teller.solve(scene, Context(probe=probe)), title="t on s/x", row=ROW)
+    assert estimate.disparity[1] is teller.answer
+    return path
+
+
+@pytest.fixture(scope="module")
+def rows(path: Path) -> dict[str, list[Row]]:
+    return read(path)
+
+
+def test_every_stream_is_there(rows: dict[str, list[Row]]) -> None:
+    once = {"/about", "/truth/disparity", "/estimate/disparity", "/estimate/error", "/regions", "/regions/all"}
+    once |= {"/regions/nonocc", "/slices/similarity", "/surface", "/surface/points", "/space", "/space/materiality"}
+    once |= {"/volumes/materiality", "/views/im2/row"}
+    labels = ["im0", "im2", "im4", "im6"]
+    once |= {f"/{stem}/{label}" for stem in ("views", "volumes/visibility", "space/frustums") for label in labels}
+    once |= {f"/volumes/similarity/{a}\\-{b}" for a, b in (("im0", "im2"), ("im2", "im4"), ("im4", "im6"))}
+    every = {"/energy/total", "/energy/data", "/slices/materiality", "/slices/derivative", "/passes/disparity"}
+    cameras = {f"/surface/cameras/{label}" for label in labels}
+    names = {entity.replace("\\", "") for entity in rows}
+    expected = {e.replace("\\", "") for e in once | every | cameras}
+    assert names - {"/__properties", "/energy/late"} == expected
+    assert all(len(rows[e]) == 1 and rows[e][0][0] is None for e in rows if e in once)
+    assert all([step for step, _ in rows[e]] == list(range(PASSES)) for e in every)
+    assert [step for step, _ in rows["/energy/late"]] == [0, 1]
+
+
+def test_one_recording_with_its_blueprint(path: Path) -> None:
+    reader = rr.chunk.RrdReader(path)
+    assert (len(reader.recordings()), len(reader.blueprints())) == (1, 1)
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_rerun_verifies_it(path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "rerun_cli", "rrd", "verify", str(path)], capture_output=True, text=True, check=True
+    )
+    assert "1 file verified without error" in done.stdout + done.stderr
+    assert "WARN" not in done.stderr
+
+
+def test_energies_are_those_told(rows: dict[str, list[Row]]) -> None:
+    assert [values["Scalars:scalars"] for _, values in rows["/energy/total"]] == [10.0 - p for p in range(PASSES)]
+
+
+def test_similarity_slice_is_three_pairs(rows: dict[str, list[Row]], told: tuple[Scene, Teller]) -> None:
+    slices = picture(rows["/slices/similarity"][0][1])
+    planes = told[1].space.planes
+    thick = slices.shape[0] // planes
+    expected = np.stack([np.rint(255 * pair[ROW]) for pair in told[1].pairs], axis=2)
+    assert np.array_equal(slices[::thick], expected[::-1])  # the farthest plane at the bottom
+    assert np.array_equal(slices[thick - 1 :: thick], expected[::-1])
+
+
+def test_slices_of_every_pass(rows: dict[str, list[Row]], told: tuple[Scene, Teller]) -> None:
+    for step in range(PASSES):
+        material = picture(rows["/slices/materiality"][step][1])[:, :, 0]
+        slopes = picture(rows["/slices/derivative"][step][1])
+        thick = material.shape[0] // told[1].space.planes
+        assert np.array_equal(material[::thick], np.rint(255 * told[1].states[step][ROW])[::-1])
+        sign = told[1].slopes[step][ROW][::-1]
+        assert np.array_equal(slopes[::thick] == 255, np.stack([sign < 0, sign < -1, sign > 0], axis=2))
+
+
+def test_volumes_are_bytes(rows: dict[str, list[Row]], told: tuple[Scene, Teller]) -> None:
+    scene, teller = told
+    volume = Volume(teller.space, teller.states[-1], tuple(range(scene.n)))
+    raw = rows["/volumes/materiality"][0][1]["Tensor:data"]
+    assert raw["names"] == ["row", "plane", "column"]
+    assert np.array_equal(tensor(rows["/volumes/materiality"][0][1]), np.rint(255 * volume.values))
+    seen = np.rint(255 * visibility(volume, 2))
+    assert np.array_equal(tensor(rows["/volumes/visibility/im4"][0][1]), seen)
+    similar = next(rows[e] for e in rows if e.replace("\\", "") == "/volumes/similarity/im0-im2")
+    assert np.array_equal(tensor(similar[0][1]), np.rint(255 * teller.pairs[0]))
+
+
+def test_volumes_have_the_type_uint8(path: Path) -> None:
+    kinds = []
+    for chunk in rr.chunk.RrdReader(path).stream():
+        if str(chunk.entity_path).startswith("/volumes/"):
+            buffer = chunk.to_record_batch().column("Tensor:data")[0].values.field("buffer")
+            kinds += [buffer.type.field(code).name for code in buffer.type_codes.to_pylist()]
+    assert kinds == ["U8"] * 8
+
+
+def test_maps_have_the_colours_of_their_numbers(rows: dict[str, list[Row]], told: tuple[Scene, Teller]) -> None:
+    scene, teller = told
+    truth, ends = scene.truth[1], drawing.disparity_ends(scene)
+    assert ends == (2, 6)
+    shown = picture(rows["/estimate/disparity"][0][1])
+    assert np.array_equal(shown, drawing.disparity_colors(teller.answer, ends))
+    assert set(np.unique(shown[3:6, :5])) <= {196, 250}  # no answer: stripes
+    true = picture(rows["/truth/disparity"][0][1])
+    assert (true[0] == 128).all()
+    assert (true[1:][truth[1:] == 2] == (68, 1, 84)).all()
+    assert (true[1:][truth[1:] == 6] == (253, 231, 37)).all()
+    error = picture(rows["/estimate/error"][0][1])
+    wrong = 2 * np.abs(teller.answer - truth)
+    assert (error[0] == 128).all()
+    assert (error[wrong >= 4] == (252, 253, 191)).all()
+    assert np.array_equal(picture(rows["/passes/disparity"][3][1]), drawing.disparity_colors(teller.maps[3], ends))
+    mask = picture(rows["/regions/nonocc"][0][1], "SegmentationImage")[:, :, 0]
+    assert np.array_equal(mask == 1, scene.regions["nonocc"])
+    assert np.array_equal(picture(rows["/views/im6"][0][1]), scene.views[3])
+
+
+def test_surface_has_a_point_for_every_answer(path: Path, told: tuple[Scene, Teller]) -> None:
+    scene, teller = told
+    for chunk in rr.chunk.RrdReader(path).stream():
+        if str(chunk.entity_path) == "/surface/points":
+            batch = chunk.to_record_batch()
+            points = np.array(batch.column("Points3D:positions")[0].as_py())
+            colors = np.array(batch.column("Points3D:colors")[0].as_py())
+    known = np.isfinite(teller.answer)
+    assert len(points) == known.sum() == len(colors)
+    assert np.array_equal(colors >> 24, scene.views[1][known][:, 0])
+    offset = drawing.Perspective.of(scene).offset
+    assert np.allclose(points[:, 2], (7 + offset) / (teller.answer[known] + offset), rtol=1e-5)
+
+
+@pytest.mark.parametrize(("least", "largest"), [(0, 7), (-5, 2), (-3, -3), (0, 0), (4, 9), (1, 60)])
+def test_depths_are_positive_and_bounded(least: float, largest: float) -> None:
+    scene = make_scene(least=least, largest=largest)
+    disparity = np.linspace(least, largest, 600, dtype=np.float32).reshape(20, 30)
+    points, _, radii = drawing.Perspective.of(scene).surface(disparity, 1000)
+    assert points[:, 2].min() == pytest.approx(1)
+    assert points[:, 2].max() <= drawing.DEEPEST + 1e-4
+    assert (radii > 0).all()
+    if least == 4:
+        assert drawing.Perspective.of(scene).offset == 0  # true perspective where it is possible
+
+
+@pytest.mark.parametrize("passes", [1, 2, 19, 20, 21, 50, 333])
+def test_few_passes_are_kept_of_many(passes: int) -> None:
+    probe, state = RecordingProbe(0), np.zeros((1, 1), np.float32)
+    for step in range(passes):
+        probe.iteration(step, {"total": 1.0}, disparity=state)
+    kept = [frame.step for frame in probe.frames]
+    assert len(probe.energies["total"]) == passes
+    assert kept[0] == 0
+    assert kept[-1] == passes - 1
+    assert kept == sorted(set(kept))
+    assert min(passes, 11) <= len(kept) <= 20
+
+
+def test_a_method_that_tells_nothing(tmp_path: Path) -> None:
+    scene = make_scene()
+    record(tmp_path / "r.rrd", scene, lambda probe: Estimate({1: scene.truth[1]}), title="quiet")
+    entities = set(read(tmp_path / "r.rrd"))
+    assert {"/estimate/error", "/surface/points"} <= entities
+    assert not [e for e in entities if e.startswith(("/volumes", "/slices", "/space", "/energy", "/passes"))]
+
+
+def test_a_scene_of_which_nothing_is_known_and_an_empty_answer(tmp_path: Path) -> None:
+    full = make_scene()
+    scene = Scene(full.name, full.views, full.labels, 1, full.disparities, {}, 1.0)
+    nothing = np.full((20, 30), np.nan, np.float32)
+    record(tmp_path / "r.rrd", scene, lambda probe: Estimate({1: nothing}), title="empty")
+    entities = set(read(tmp_path / "r.rrd"))
+    assert "/estimate/disparity" in entities
+    assert not {"/estimate/error", "/truth/disparity", "/regions"} & entities
+
+
+def test_a_solve_that_fails_leaves_nothing(tmp_path: Path) -> None:
+    def solve(probe: Probe) -> Estimate:
+        probe.iteration(0, {"total": 1.0})
+        raise RuntimeError("no")
+
+    with pytest.raises(RuntimeError, match="no"):
+        record(tmp_path / "r.rrd", make_scene(), solve, title="t")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, scene = tmp_path / "r.rrd", make_scene()
+    path.write_text("old")
+    honest = recording._write
+
+    def cut(*args: Any) -> Any:
+        written = honest(*args)
+        os.truncate(args[0], os.path.getsize(args[0]) // 2)  # noqa: PTH202
+        return written
+
+    monkeypatch.setattr(recording, "_write", cut)
+    with pytest.raises(RecordingError, match="cannot be read back"):
+        record(path, scene, lambda probe: Estimate({1: scene.truth[1]}), title="t")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_rerun_did_not_write_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, honest = make_scene(), recording._write
+
+    def more(*args: Any) -> Any:
+        written = honest(*args)
+        written["/estimate/lost"] += 1
+        return written
+
+    monkeypatch.setattr(recording, "_write", more)
+    with pytest.raises(RecordingError, match="lost"):
+        record(tmp_path / "r.rrd", scene, lambda probe: Estimate({1: scene.truth[1]}), title="t")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_recordings_do_not_mix(tmp_path: Path) -> None:
+    scene = make_scene()
+    for passes in (2, 3):
+        teller = Teller(scene, passes)
+        solved = lambda probe: teller.solve(scene, Context(probe=probe))  # noqa: B023, E731
+        record(tmp_path / f"{passes}.rrd", scene, solved, title="same title")
+    for passes in (2, 3):
+        assert len(read(tmp_path / f"{passes}.rrd")["/energy/total"]) == passes
+    assert not rr.is_enabled()  # and no recording of this process is active
+
+
+def test_a_row_outside_the_scene(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"row 20 is not one of 0\.\.19"):
+        record(tmp_path / "r.rrd", make_scene(), lambda probe: Estimate({}), title="t", row=20)
+
+
+@pytest.mark.parametrize("fineness", [1, 2])
+def test_a_reduced_volume_is_exact_where_it_is_kept(fineness: int) -> None:
+    space = DisparitySpace(3, 40, 60, -4, 9, fineness)
+    values = np.random.default_rng(0).random(space.shape, np.float32)
+    volume = Volume(space, values, (0, 1, 2))
+    small = drawing.reduced(volume, 17, limit=values.size // 8)
+    assert small.values.size <= values.size // 8
+    rows, planes, columns = small.steps
+    assert planes == 1
+    assert (17 - small.first_row) % rows == 0
+    assert np.array_equal(small.values, np.rint(255 * values[small.first_row :: rows, :, ::columns]))
+    seen = drawing.reduced(volume, 17, view=2, limit=values.size // 8)
+    assert np.array_equal(seen.values, np.rint(255 * visibility(volume, 2)[small.first_row :: rows, :, ::columns]))
+    tiny = drawing.reduced(volume, 17, limit=20)
+    assert tiny.values.size <= 20
+
+
+def test_a_quarter_size_cell_is_small(tmp_path: Path) -> None:
+    scene = make_scene(4, 375, 450, 0, 59)
+    space = DisparitySpace.covering(scene.disparities, 4, 375, 450)
+    random = np.random.default_rng(0)
+    noise = Volume(space, random.random(space.shape, np.float32), (0, 1, 2, 3))  # nothing compresses it
+    maps = random.uniform(0, 59, (375, 450)).astype(np.float32)
+
+    def solve(probe: Probe) -> Estimate:
+        for i in range(3):
+            probe.volume(f"similarity/{i}-{i + 1}", noise)
+        for step in range(20):
+            probe.iteration(step, {"total": 1.0}, noise, noise, maps)
+        return Estimate({1: maps}, noise)
+
+    record(tmp_path / "r.rrd", scene, solve, title="large")
+    assert (tmp_path / "r.rrd").stat().st_size < 60e6
+
+
+def test_view_needs_a_recording_and_a_display(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(UserError, match="no recording"):
+        view(path.with_name("other.rrd"), web=True)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(UserError, match="--web"):
+        view(path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent as a POSIX signal")
+def test_the_web_viewer_answers_and_ends_with_ctrl_c(path: Path, tmp_path: Path) -> None:
+    code = f"from pathlib import Path; from matbench.viewer import view; view(Path({str(path)!r}), web=True)"
+    # no browser: the viewer must not open one in a test
+    quiet = {**os.environ, "BROWSER": "true", "HOME": str(tmp_path)}
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=quiet) as served:
+        assert served.stdout is not None
+        address = served.stdout.readline().split()[0]
+        with urllib.request.urlopen(address, timeout=10) as page:  # noqa: S310
+            assert page.status == 200
+        served.send_signal(signal.SIGINT)
+        assert served.wait(timeout=10) == 0
+    with pytest.raises(OSError, match="refused"):
+        urllib.request.urlopen(address, timeout=10)  # noqa: S310
