@@ -1,0 +1,218 @@
+"""Visibility, energy and gradient against brute force in float64."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from matbench.algorithms.materiality.binarize import PRIOR, by_plane, by_ray, seen_rays, visible_cost
+from matbench.algorithms.materiality.descent import Energy, edge_weights
+from matbench.algorithms.materiality.energy import data_row, see_row, smooth_row, total_row
+from matbench.algorithms.materiality.start import mean_similarity, soften
+from matbench.algorithms.similarity import pairs
+from matbench.space import DisparitySpace, Volume, visibility
+
+SPACES = st.builds(
+    lambda n, rows, width, first, extent, q: DisparitySpace(n, rows, width, first, first + extent, q),
+    n=st.integers(2, 4),
+    rows=st.integers(1, 3),
+    width=st.integers(1, 6),
+    first=st.integers(-3, 1),
+    extent=st.integers(0, 4),
+    q=st.integers(1, 2),
+)
+PAIR_SETS = st.sampled_from(["all", "consecutive"])
+
+
+def ray_walk(mu, space, view):
+    """(planes, columns) visibility of one row, walking from every point towards the camera (SPEC 1, 2-4)."""
+    seen = np.zeros(mu.shape)
+    for k, c in np.ndindex(mu.shape):
+        sample = c - space.start(view, k)
+        if 0 <= sample < space.samples:
+            seen[k, c] = np.prod([1 - mu[m, space.start(view, m) + sample] for m in range(k + 1, space.planes)])
+    return seen
+
+
+def data_energy(mu, rho, space, which):
+    """Equation 6 of one row."""
+    seen = [ray_walk(mu, space, view) for view in range(space.views)]
+    return sum(((rho[p] - mu * seen[i] * seen[j]) ** 2).sum() for p, (i, j) in enumerate(which))
+
+
+def random_row(space, which, seed, opaque=True):
+    rng = np.random.default_rng(seed)
+    mu = rng.random((space.planes, space.columns))
+    if opaque:
+        mu[rng.random(mu.shape) < 0.2] = 1
+    rho = rng.random((len(which), space.planes, space.columns))
+    for p, (i, j) in enumerate(which):
+        for k in range(space.planes):
+            inside = np.zeros((2, space.columns), bool)
+            inside[0, space.frustum(i, k)] = inside[1, space.frustum(j, k)] = True
+            rho[p, k, ~inside.all(axis=0)] = 0
+    return mu, rho
+
+
+def kernel_row(mu, rho, space, which, kind=np.float64):
+    mu, one = mu.astype(kind), kind(1)
+    seen = np.empty((space.views, space.planes, space.samples), kind)
+    see_row(mu, space.first, space.origin, one, seen)
+    slope = np.empty_like(mu)
+    work = np.empty((2, space.views, space.samples), kind)
+    energy = data_row(mu, seen, rho.astype(kind), one, which, space.first, space.origin, one, slope, *work)
+    return seen, energy, slope
+
+
+@settings(max_examples=40, deadline=None)
+@given(SPACES, PAIR_SETS, st.integers(0, 999))
+def test_visibility_energy_and_gradient(space, which, seed):
+    which = pairs(space.views, which)
+    mu, rho = random_row(space, which, seed)
+    seen, energy, slope = kernel_row(mu, rho, space, which)
+    everywhere = np.broadcast_to(mu.astype(np.float32), space.shape)
+    for view in range(space.views):
+        expected = ray_walk(mu, space, view)
+        known = visibility(Volume(space, everywhere, tuple(range(space.views))), view)[0]
+        np.testing.assert_allclose(known, expected, atol=1e-6)
+        for k in range(space.planes):
+            np.testing.assert_allclose(seen[view, k], expected[k, space.frustum(view, k)], atol=1e-12)
+    assert energy == pytest.approx(data_energy(mu, rho, space, which), abs=1e-10)
+    points = list(np.ndindex(mu.shape))
+    for point in [points[m] for m in np.random.default_rng(seed).permutation(len(points))[:12]]:
+        # E is quadratic in each single mu: central differences are exact, at mu = 1 as well
+        high, low = mu.copy(), mu.copy()
+        high[point] += 1e-3
+        low[point] -= 1e-3
+        numeric = (data_energy(high, rho, space, which) - data_energy(low, rho, space, which)) / 2e-3
+        assert slope[point] == pytest.approx(numeric, abs=1e-8)
+
+
+@pytest.mark.parametrize("which", ["all", "consecutive"])
+def test_float32_agrees_with_float64(which):
+    space = DisparitySpace(4, 1, 20, -3, 4, 2)
+    views = pairs(4, which)
+    mu, rho = random_row(space, views, 1)
+    _, exact, slope = kernel_row(mu, rho, space, views)
+    _, energy, found = kernel_row(mu, rho, space, views, np.float32)
+    assert energy == pytest.approx(exact, rel=1e-5)
+    np.testing.assert_allclose(found, slope, atol=1e-4)
+
+
+@settings(max_examples=15, deadline=None)
+@given(SPACES, PAIR_SETS, st.booleans(), st.integers(0, 999))
+def test_whole_energy_and_its_gradient(space, which, per_row, seed):
+    which = pairs(space.views, which)
+    rng = np.random.default_rng(seed)
+    rows = [random_row(space, which, seed + y) for y in range(space.rows)]
+    mu, rho = (np.stack(part) for part in zip(*rows, strict=True))
+    down, right = rng.integers(0, 256, (2, *space.shape), dtype=np.uint8)
+    energy = Energy(space, which, rho, 3.0, 0.3, per_row, 2.0, 1.5, (down, right), 1.0)
+
+    def twin(at):
+        data = sum(data_energy(at[y], rho[y], space, which) for y in range(space.rows))
+        excess = at.sum(axis=(1, 2)) - 3.0 if per_row else [at.sum() - 3.0 * space.rows]
+        count = 0.3 * np.sum(np.square(excess)) / (3.0 if per_row else 3.0 * space.rows)
+        adjacent = (down[:-1] / 255 * 2.0 * np.diff(at, axis=0) ** 2).sum()
+        adjacent += (right[..., :-1] / 255 * 1.5 * np.diff(at, axis=2) ** 2).sum()
+        return data, count, adjacent
+
+    before, new, slopes = rng.random(mu.shape), np.empty_like(mu), np.empty_like(mu)
+    at = np.clip(mu + 0.5 * (mu - before), 0, 1)
+    for threads in (1, 2):
+        found = energy.step(mu, before, 0.5, 0.01, new, slopes, threads)
+        assert [found[part] for part in ("data", "count", "adjacent")] == pytest.approx(twin(at), rel=1e-9, abs=1e-9)
+        assert found["total"] == pytest.approx(sum(twin(at)), rel=1e-9, abs=1e-9)
+        np.testing.assert_allclose(new, np.clip(at - 0.01 * slopes, 0, 1), atol=1e-12)
+    points = list(np.ndindex(mu.shape))
+    for point in [points[m] for m in rng.permutation(len(points))[:5]]:
+        high, low = at.copy(), at.copy()
+        high[point] += 1e-3
+        low[point] -= 1e-3
+        assert slopes[point] == pytest.approx((sum(twin(high)) - sum(twin(low))) / 2e-3, abs=1e-7)
+
+
+def test_smooth_row_is_shared_evenly_between_rows():
+    rng = np.random.default_rng(0)
+    mu, weight = rng.random((3, 2, 5)), np.full((2, 5), 255, np.uint8)
+    slope = np.zeros((2, 5))
+    energy = smooth_row(mu[1], mu[0], mu[2], weight, weight, weight, 2 / 255, 3 / 255, slope)
+    assert energy == pytest.approx(2 * ((mu[2] - mu[1]) ** 2).sum() + 3 * (np.diff(mu[1], axis=1) ** 2).sum())
+    assert total_row(mu[0]) == pytest.approx(mu[0].sum())
+
+
+@settings(max_examples=20, deadline=None)
+@given(SPACES, PAIR_SETS, st.integers(0, 999))
+def test_starts_and_reading_are_their_twins(space, which, seed):
+    which = pairs(space.views, which)
+    rng = np.random.default_rng(seed)
+    both = np.zeros((len(which), space.planes, space.columns), bool)
+    sees = np.zeros((space.views, space.planes, space.columns), bool)
+    for k in range(space.planes):
+        for view in range(space.views):
+            sees[view, k, space.frustum(view, k)] = True
+    for p, (i, j) in enumerate(which):
+        both[p] = sees[i] & sees[j]
+    rho = rng.integers(0, 256, (space.rows, *both.shape), dtype=np.uint8) * both
+    mean = np.empty(space.shape, np.float32)
+    mean_similarity(rho, which, space.first, space.origin, space.samples, mean)
+    expected = rho.sum(axis=1) / 255 / np.maximum(both.sum(axis=0), 1)
+    np.testing.assert_allclose(mean, expected, atol=1e-6)
+
+    soft, mu = np.exp(20 * (expected - 1)), np.zeros(space.shape)
+    for view in range(space.views):
+        rays = np.stack([soft[:, k, space.frustum(view, k)] for k in range(space.planes)])
+        for k in range(space.planes):
+            mu[:, k, space.frustum(view, k)] += rays[k] / rays.sum(axis=0)
+    mu /= np.maximum(sees.sum(axis=0), 1)
+    soften(mean, space.views, space.first, space.origin, space.samples, np.float32(20))
+    np.testing.assert_allclose(mean, mu, rtol=2e-4, atol=1e-7)
+
+    view, mu = int(rng.integers(space.views)), rng.random(space.shape, np.float32)
+    seen = [np.stack([ray_walk(row, space, i) for row in mu]) for i in range(space.views)]
+    reached = space.in_view(mu * seen[view], view).transpose(0, 2, 1)
+    np.testing.assert_allclose(seen_rays(mu, space, view, 2), reached, atol=1e-6)
+
+    # a plane does not hide the one behind it: V of the next plane on the same ray
+    total, weight = np.full(space.shape, PRIOR * 0.6), np.full(space.shape, PRIOR)
+    for p, (i, j) in enumerate(which):
+        for k in range(space.planes):
+            near = min(k + 1, space.planes - 1)
+            pair = both[p, k].astype(float) * np.ones((space.rows, 1))
+            for other in {i, j} - {view}:
+                shifted = np.zeros((space.rows, space.columns))
+                shifted[:, space.frustum(other, k)] = seen[other][:, near, space.frustum(other, near)]
+                pair *= shifted
+            total[:, k] += pair * (1 - rho[:, p, k] / 255)
+            weight[:, k] += pair
+    cost, material = visible_cost(mu, rho, space, which, view, 0.6, 2)
+    np.testing.assert_allclose(cost, space.in_view(total / weight, view).transpose(0, 2, 1), atol=1e-5)
+    np.testing.assert_array_equal(material, space.in_view(mu, view).transpose(0, 2, 1))
+
+
+def test_edge_weights_are_means_over_the_views_that_see():
+    space = DisparitySpace(2, 3, 4, 0, 1)
+    rows = np.random.default_rng(0).random((2, 3, 3, 4), np.float32) * 50
+    down, right = edge_weights(rows, space, 10.0)
+    w = np.exp(-np.abs(np.diff(rows, axis=2)).mean(axis=1) / 10)
+    # plane 1: view 1 starts one column later
+    assert down[0, 1, 0] == round(255 * float(w[0, 0, 0]))
+    assert down[0, 1, 2] == round(255 * float(w[0, 0, 2] + w[1, 0, 1]) / 2)
+    w = np.exp(-np.abs(np.diff(rows, axis=3)).mean(axis=1) / 10)
+    assert right[1, 0, 2] == round(255 * float(w[0, 1, 2] + w[1, 1, 2]) / 2)
+
+
+def test_by_ray_takes_the_most_material_point_and_its_neighbours():
+    seen = np.array([[[0, 0.2, 0.6, 0.2, 0], [0.5, 0, 0, 0, 0], [0, 0, 0, 0, 0]]], np.float32)
+    np.testing.assert_allclose(by_ray(seen), [[2, 0, np.nan]])
+
+
+def test_by_plane_keeps_n_points_and_takes_the_nearest():
+    space = DisparitySpace(2, 1, 2, 0, 2)
+    mu = np.zeros(space.shape, np.float32)
+    mu[0, 0, space.start(0, 0)] = 0.9
+    mu[0, 2, space.start(0, 2)] = 0.8
+    mu[0, 1, space.start(0, 1) + 1] = 0.1
+    np.testing.assert_array_equal(by_plane(mu, space, 0, 2), [[2, np.nan]])
+    np.testing.assert_array_equal(by_plane(mu, space, 0, 1), [[0, np.nan]])
+    np.testing.assert_array_equal(by_plane(mu, space, 0, 9), [[2, 1]])

@@ -1,0 +1,108 @@
+"""Semi-global aggregation against a direct recursion along each of the eight paths."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from matbench.algorithms.semiglobal import SemiGlobal, aggregate, penalties, winner
+
+DIRECTIONS = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
+
+
+def twin(cost, image, small, large, edge):
+    """L(p, k) = C + min(L(q, k), L(q, k +- 1) + P1, min L(q) + P2) - min L(q), summed over the paths."""
+    height, width, planes = cost.shape
+    known = np.nan_to_num(cost.astype(float))
+    total = np.zeros(cost.shape)
+    for dy, dx in DIRECTIONS:
+        paths = np.zeros(cost.shape)
+        for y in range(height)[:: -1 if dy < 0 else 1]:
+            for x in range(width)[:: -1 if dx < 0 else 1]:
+                paths[y, x] = known[y, x]
+                if 0 <= y - dy < height and 0 <= x - dx < width:
+                    last = paths[y - dy, x - dx]
+                    contrast = np.abs(image[y, x].astype(int) - image[y - dy, x - dx]).max()
+                    jump = max(small, large * np.exp(-contrast / edge))
+                    for k in range(planes):
+                        moves = [last[k], last.min() + jump]
+                        moves += [last[m] + small for m in (k - 1, k + 1) if 0 <= m < planes]
+                        paths[y, x, k] += min(moves) - last.min()
+        total += paths
+    return total
+
+
+def twin_winner(total, cost, fit):
+    found = np.full(total.shape[:2], np.nan)
+    for y, x in np.ndindex(found.shape):
+        known = ~np.isnan(cost[y, x])
+        if not known.any():
+            continue
+        k = int(np.argmin(np.where(known, total[y, x], np.inf)))
+        found[y, x] = k
+        if 0 < k < total.shape[2] - 1 and known[k - 1] and known[k + 1]:
+            below, here, above = fit[y, x, k - 1 : k + 2].astype(float)
+            if here <= min(below, above) and max(below, above) > here:
+                found[y, x] += (below - above) / (2 * (max(below, above) - here))
+    return found
+
+
+@st.composite
+def problems(draw):
+    shape = tuple(draw(st.integers(1, top)) for top in (5, 6, 7))
+    rng = np.random.default_rng(draw(st.integers(0, 999)))
+    cost = rng.random(shape, np.float32)
+    cost[rng.random(shape) < draw(st.sampled_from([0, 0.2, 0.9]))] = np.nan
+    return cost, rng.integers(0, 60, (*shape[:2], 3), dtype=np.uint8)
+
+
+@settings(max_examples=30, deadline=None)
+@given(problems(), st.sampled_from([(0.1, 0.6), (0.5, 3.0), (0.5, 0.1), (0.0, 0.0)]))
+def test_aggregation_and_winner_are_their_twins(problem, steps):
+    cost, image = problem
+    total = aggregate(cost, image, *steps, 25.0)
+    expected = twin(cost, image, *steps, 25.0)
+    np.testing.assert_allclose(total, expected, rtol=2e-5, atol=2e-5)
+    fit = np.roll(total, 1, axis=0)
+    np.testing.assert_allclose(winner(total, cost, fit), twin_winner(total, cost, fit), atol=1e-3)
+
+
+def test_threads_change_nothing():
+    rng = np.random.default_rng(0)
+    cost, image = rng.random((20, 30, 9), np.float32), rng.integers(0, 256, (20, 30, 3), dtype=np.uint8)
+    one, two = (aggregate(cost, image, 0.5, 3.0, 25.0, threads) for threads in (1, 2))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_unknown_pixels_answer_nothing_and_pass_messages_on():
+    cost = np.ones((3, 9, 5), np.float32)
+    cost[..., 2] = 0
+    cost[:, 4] = np.nan
+    found = SemiGlobal().read(cost, np.zeros((3, 9, 3), np.uint8))
+    assert np.isnan(found[:, 4]).all()
+    np.testing.assert_array_equal(found[:, [0, 3, 5, 8]], 2)
+
+
+def test_fit_lies_between_planes_and_ignores_the_extra_cost():
+    planes = np.arange(9, dtype=np.float32)
+    cost = np.broadcast_to(np.abs(planes - 4.3), (4, 4, 9)).astype(np.float32)
+    extra = np.broadcast_to(np.where(planes == 4, 0, 1), cost.shape).astype(np.float32)
+    image = np.zeros((4, 4, 3), np.uint8)
+    found = SemiGlobal().read(cost, image, extra=extra)
+    # neighbours pull a little towards the plane they agree on
+    np.testing.assert_allclose(found, 4.3, atol=0.1)
+    np.testing.assert_array_equal(found, SemiGlobal().read(cost, image))
+    np.testing.assert_allclose(SemiGlobal(small_step=0, large_step=0).read(cost, image), 4.3, atol=1e-3)
+
+
+def test_penalties_fall_with_contrast_to_the_small_step():
+    table = penalties(0.5, 3.0, 25.0)
+    assert table[0] == 3
+    assert table[255] == 0.5
+    assert (np.diff(table) <= 0).all()
+
+
+@pytest.mark.parametrize(("name", "value"), [("small_step", -1.0), ("large_step", -1.0), ("contrast", 0.0)])
+def test_a_wrong_value_names_the_parameter(name, value):
+    with pytest.raises(ValueError, match=name):
+        SemiGlobal(**{name: value})

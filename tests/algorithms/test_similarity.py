@@ -1,0 +1,137 @@
+"""Similarities against a plain walk over target points and window taps."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from matbench.algorithms.sampling import fine_rows
+from matbench.algorithms.similarity import Matcher, Matching, falloff, pairs
+from matbench.scene import Range, Scene
+
+
+def random_scene(n=3, height=4, width=6, least=-1.0, largest=2.0, seed=0, pair_steps=1.0):
+    views = np.random.default_rng(seed).integers(0, 256, (n, height, width, 3), dtype=np.uint8)
+    labels = tuple(map(str, range(n)))
+    return Scene("random", views, labels, n // 2, Range(least, largest), {}, pair_steps)
+
+
+def twin(matcher: Matcher) -> np.ndarray:
+    """exp(-MSD / sigma^2) or exp(-RMS / sigma), tap by tap."""
+    space, how = matcher.space, matcher.settings
+    rows = fine_rows(matcher.scene.views, space.fineness).astype(float)
+    if not how.colour:
+        rows = np.repeat(np.tensordot(rows, [0.299, 0.587, 0.114], ([1], [0]))[:, None], 3, axis=1)
+    limit, radius, q = how.truncation**2 or np.inf, how.window // 2, space.fineness
+    out = np.zeros((space.rows, len(matcher.pairs), space.planes, space.columns))
+    for y, p, k, c in np.ndindex(out.shape):
+        i, j = matcher.pairs[p]
+        ui, uj = c - space.start(i, k), c - space.start(j, k)
+        if not (0 <= ui < space.samples and 0 <= uj < space.samples):
+            continue
+        taps = []
+        for dy in range(-radius, radius + 1):
+            for dx in range(-radius * q, radius * q + 1, q):
+                inside = 0 <= y + dy < space.rows
+                if inside and min(ui, uj) + dx >= 0 and max(ui, uj) + dx < space.samples:
+                    gap = rows[i, :, y + dy, ui + dx] - rows[j, :, y + dy, uj + dx]
+                    taps.append(min(np.mean(gap**2), limit))
+        mean = np.mean(taps)
+        out[y, p, k, c] = np.exp(-mean / how.sigma**2 if how.similarity == "ssd" else -np.sqrt(mean) / how.sigma)
+    return out
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    n=st.integers(2, 4),
+    height=st.integers(1, 5),
+    width=st.integers(1, 7),
+    least=st.integers(-2, 1),
+    extent=st.integers(0, 3),
+    fineness=st.integers(1, 3),
+    window=st.sampled_from([1, 3, 5]),
+    which=st.sampled_from(["all", "consecutive"]),
+    form=st.sampled_from(["ssd", "rms"]),
+    truncation=st.sampled_from([0.0, 60.0]),
+    colour=st.booleans(),
+    seed=st.integers(0, 99),
+)
+def test_similarity_is_its_equation(
+    n, height, width, least, extent, fineness, window, which, form, truncation, colour, seed
+):
+    scene = random_scene(n, height, width, least, least + extent, seed)
+    matcher = Matcher.of(
+        scene,
+        Matching(
+            views=0,
+            fineness=fineness,
+            pairs=which,
+            similarity=form,
+            window=window,
+            sigma=70.0,
+            truncation=truncation,
+            colour=colour,
+        ),
+    )
+    rho, expected = matcher.all(), twin(matcher)
+    # half a byte of rounding, and half a step of the table
+    assert np.abs(rho / 255 - expected).max() <= 0.5 / 255 + 1e-3
+    assert not rho[expected == 0].any()
+
+
+def test_blocks_and_threads_give_the_same():
+    matcher = Matcher.of(random_scene(4, 37, 9), Matching(views=4, fineness=2))
+    rho = matcher.all(threads=1)
+    np.testing.assert_array_equal(matcher.all(threads=2), rho)
+    np.testing.assert_array_equal(matcher.block(5, 8), rho[5:8])
+
+
+def test_comparisons_counts_points_in_both_frusta():
+    matcher = Matcher.of(random_scene(3, 2, 5, -2, 3), Matching(views=3, pairs="all"))
+    space = matcher.space
+    inside = np.zeros((3, space.planes, space.columns), bool)
+    for view in range(3):
+        for k in range(space.planes):
+            inside[view, k, space.frustum(view, k)] = True
+    assert matcher.comparisons == 2 * sum((inside[i] & inside[j]).sum() for i, j in matcher.pairs)
+
+
+def test_pairs():
+    assert pairs(4, "consecutive").tolist() == [[0, 1], [1, 2], [2, 3]]
+    assert pairs(3, "all").tolist() == [[0, 1], [0, 2], [1, 2]]
+
+
+def test_falloff_is_one_for_equal_windows_and_ends_at_zero():
+    for form in ("ssd", "rms"):
+        table = falloff(form, 9.0)
+        assert table[0] == 255
+        assert table[-1] == 0
+        assert (np.diff(table.astype(int)) <= 0).all()
+        assert (table[:-1] > 0).all()
+
+
+def test_fewer_views_rescale_the_answer():
+    scene = random_scene(5, 3, 8, 0, 2, pair_steps=2.0)
+    matcher = Matcher.of(scene, Matching(views=3))
+    assert matcher.indices == (0, 2, 4)
+    assert matcher.step == 2
+    # plane k / q is in pixels per two view steps
+    found = matcher.disparity(np.array([[2.0]], np.float32))
+    assert found[0, 0] == pytest.approx(matcher.space.disparities[2] / 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("views", 1),
+        ("fineness", -1),
+        ("pairs", "some"),
+        ("similarity", "ncc"),
+        ("window", 4),
+        ("sigma", 0.0),
+        ("truncation", -1.0),
+    ],
+)
+def test_a_wrong_value_names_the_parameter(name, value):
+    with pytest.raises(ValueError, match=name):
+        Matching(**{name: value})

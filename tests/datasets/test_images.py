@@ -1,0 +1,123 @@
+"""Image files: read exactly, or refused in one line that names the file."""
+
+import struct
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from matbench.datasets.images import read_grey, read_rgb, read_size
+from matbench.errors import UserError
+
+PICTURE = np.random.default_rng(0).integers(0, 256, (7, 11, 3), np.uint8)
+
+
+def _png(image: np.ndarray) -> bytes:
+    return cv2.imencode(".png", image[..., ::-1] if image.ndim == 3 else image)[1].tobytes()
+
+
+def _pnm(image: np.ndarray, header: str = "{kind}\n# a comment\n{w} {h}\n255\n") -> bytes:
+    kind = "P6" if image.ndim == 3 else "P5"
+    return header.format(kind=kind, w=image.shape[1], h=image.shape[0]).encode() + image.tobytes()
+
+
+def _chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+def _forged_png(width: int, height: int, pixels: bytes, bits: int = 8) -> bytes:
+    header = struct.pack(">IIBBBBB", width, height, bits, 0, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + _chunk(b"IDAT", zlib.compress(pixels)) + _chunk(b"IEND", b"")
+    )
+
+
+def _refused(path: Path, *words: str, size: tuple[int, int] | None = None) -> None:
+    with pytest.raises(UserError) as caught:
+        read_rgb(path, size)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert all(word in message for word in (str(path), *words)), message
+
+
+@pytest.mark.parametrize("encode", [_png, _pnm])
+def test_colour_and_grey_come_back(tmp_path: Path, encode) -> None:
+    path = tmp_path / "image"
+    path.write_bytes(encode(PICTURE))
+    np.testing.assert_array_equal(read_rgb(path), PICTURE)
+    np.testing.assert_array_equal(read_rgb(path, (11, 7)), PICTURE)
+    assert read_size(path) == (11, 7)
+    with pytest.raises(UserError, match="is coloured"):
+        read_grey(path)
+    path.write_bytes(encode(PICTURE[..., 0]))
+    np.testing.assert_array_equal(read_grey(path), PICTURE[..., 0])
+
+
+@pytest.mark.parametrize("encode", [_png, _pnm])
+def test_truncated_anywhere_is_refused(tmp_path: Path, encode, capfd) -> None:
+    data, path = encode(PICTURE), tmp_path / "image"
+    for length in range(len(data)):
+        path.write_bytes(data[:length])
+        _refused(path)
+    assert capfd.readouterr().err == ""
+
+
+def test_png_with_a_flipped_byte_is_refused(tmp_path: Path, capfd) -> None:
+    data, path = _png(PICTURE), tmp_path / "image.png"
+    for at in range(8, len(data)):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 0x10]) + data[at + 1 :])
+        _refused(path)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", ["is empty"]),
+        (b"GIF89a whatever", ["GIF89a", "PNG", "P6"]),
+        (b"P3\n1 1\n255\n0 0 0\n", ["P3"]),
+        (b"P6\n9999999 9999999\n255\n", ["9999999x9999999", "64000000"]),
+        (b"P6\n0 5\n255\n", ["0x5"]),
+        (b"P5\n2 2\n65535\n12345678", ["65535", "255"]),
+        (b"P5\n2 2\n255\n12345", ["damaged", "5 bytes", "not 4"]),
+        (_forged_png(100_000, 100_000, b"\0" * 100), ["100000x100000"]),
+        (_forged_png(4, 4, b"\0" * 19), ["damaged", "4x4"]),
+        (_forged_png(4, 4, b"\0" * 21), ["damaged", "4x4"]),
+        (_forged_png(4, 4, b"\0" * 36, bits=16), ["16 bits", "8"]),
+    ],
+)
+def test_malformed_is_refused(tmp_path: Path, data: bytes, words: list[str]) -> None:
+    path = tmp_path / "image"
+    path.write_bytes(data)
+    _refused(path, *words)
+
+
+def test_missing_folder_and_wrong_size_are_refused(tmp_path: Path) -> None:
+    _refused(tmp_path / "none.png", "missing")
+    _refused(tmp_path)
+    path = tmp_path / "image.png"
+    path.write_bytes(_png(PICTURE))
+    _refused(path, "11x7", "12x7", size=(12, 7))
+
+
+@pytest.mark.parametrize(
+    "name", ["scenes2001/data/venus/im0.ppm", "scenes2001/data/venus/disp2.pgm", "scenes2003/newdata/teddy/im2.png"]
+)
+def test_truncated_copies_of_real_files_are_refused(data_root: Path, tmp_path: Path, name: str) -> None:
+    source = data_root / "middlebury" / name
+    data, path = source.read_bytes(), tmp_path / source.name
+    assert read_rgb(source).shape[:2] == read_size(source)[::-1]
+    for length in (10, 100, len(data) // 2, len(data) - 1):
+        path.write_bytes(data[:length])
+        _refused(path)
+
+
+def test_png_and_ppm_of_a_real_view_agree(data_root: Path) -> None:
+    """The masks' folder holds teddy's views again, in PNG files of their own."""
+    middlebury = data_root / "middlebury"
+    one = read_rgb(middlebury / "scenes2003/newdata/teddy/im2.png")
+    np.testing.assert_array_equal(one, read_rgb(middlebury / "eval_v2/teddy/imL.png"))
+    two = read_rgb(middlebury / "scenes2001/data/venus/im2.ppm")
+    np.testing.assert_array_equal(two, read_rgb(middlebury / "eval_v2/venus/imL.png"))
