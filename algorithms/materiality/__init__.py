@@ -1,0 +1,5 @@
+"""The materiality map (ICIP 2014): where the surfaces of a scene are, as a fuzzy map over disparity space."""
+
+from matbench.algorithms.materiality.method import Materiality
+
+__all__ = ["Materiality"]

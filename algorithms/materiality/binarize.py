@@ -1,0 +1,140 @@
+"""From a fuzzy map of materialities to the disparities of the reference view."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from matbench.algorithms.materiality.energy import see_row
+from matbench.algorithms.parallel import over_rows
+from matbench.algorithms.similarity import FULL
+from matbench.space import DisparitySpace
+
+PRIOR = 0.1  # weight of the cost of being hidden, against 1 for a pair that sees the point
+
+
+@njit(nogil=True, cache=True)
+def _seen_rays(mu, view, first, origin, fineness, top, end, seen):  # type: ignore[no-untyped-def]
+    one = np.float32(1)
+    planes, width = seen.shape[2], seen.shape[1]
+    for y in range(top, end):
+        for x in range(width):
+            through = one
+            for k in range(planes - 1, -1, -1):
+                point = mu[y, k, view * (first + k) - origin + x * fineness]
+                seen[y, x, k] = point * through
+                through *= one - point
+
+
+def seen_rays(mu: NDArray[np.float32], space: DisparitySpace, view: int, threads: int = 1) -> NDArray[np.float32]:
+    """(H, W, planes) mu V_view on the pixel rays of a view: where each ray ends; sums to at most 1 (SPEC 3)."""
+    seen = np.empty((space.rows, space.width, space.planes), np.float32)
+    over_rows(
+        lambda top, end: _seen_rays(mu, view, space.first, space.origin, space.fineness, top, end, seen),
+        space.rows,
+        threads,
+    )
+    return seen
+
+
+def by_ray(seen: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(H, W) plane index where a ray most likely ends: argmax of mu V, refined by its neighbours' share.
+
+    The refinement is the centroid of the winner and its two neighbours. NaN where nothing is
+    material along the ray.
+    """
+    planes = seen.shape[2]
+    best = np.argmax(seen, axis=2)
+    found = best.astype(np.float32)
+    near = np.stack([np.clip(best + d, 0, planes - 1) for d in (-1, 0, 1)], axis=2)
+    weights = np.take_along_axis(seen, near, axis=2)
+    total = weights.sum(axis=2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = (weights * near).sum(axis=2) / total
+    return np.where(weights[..., 1] > 0, found, np.float32(np.nan)).astype(np.float32)
+
+
+def by_plane(mu: NDArray[np.float32], space: DisparitySpace, view: int, target: float) -> NDArray[np.float32]:
+    """(H, W) plane index of the nearest of the `target` most material points of each epipolar plane.
+
+    The paper's rule: every epipolar plane alone. NaN where a ray meets none of them. Of equal
+    materialities the nearer points are taken first.
+    """
+    found = np.full((space.rows, space.width), np.nan, np.float32)
+    count = min(round(target), space.planes * space.columns)
+    for y in range(space.rows):
+        nearest_first = mu[y, ::-1].ravel()
+        kept = np.zeros(nearest_first.size, bool)
+        kept[np.argsort(-nearest_first, kind="stable")[:count]] = True
+        kept &= nearest_first > 0
+        solid = kept.reshape(mu[y].shape)[::-1]
+        for k in range(space.planes):  # far to near: the nearest stays
+            found[y, solid[k, space.frustum(view, k)][:: space.fineness]] = k
+    return found
+
+
+@njit(nogil=True, cache=True)
+def _visible_cost(mu, rho, pairs, views, view, first, origin, fineness, hidden, prior, top, end, cost, material):  # type: ignore[no-untyped-def]
+    _, width, planes = cost.shape
+    samples = (width - 1) * fineness + 1
+    seen = np.empty((views, planes, samples), np.float32)
+    one, scale = np.float32(1), np.float32(1 / FULL)
+    for y in range(top, end):
+        see_row(mu[y], first, origin, one, seen)
+        for x in range(width):
+            for k in range(planes):
+                column = view * (first + k) - origin + x * fineness
+                near = min(k + 1, planes - 1)
+                total, weight = prior * hidden, prior
+                for p in range(pairs.shape[0]):
+                    i, j = pairs[p, 0], pairs[p, 1]
+                    ui, uj = column - (i * (first + k) - origin), column - (j * (first + k) - origin)
+                    if 0 <= ui < samples and 0 <= uj < samples:
+                        both = one
+                        if i != view:
+                            both *= seen[i, near, ui]
+                        if j != view:
+                            both *= seen[j, near, uj]
+                        total += both * (one - scale * rho[y, p, k, column])
+                        weight += both
+                cost[y, x, k] = total / weight
+                material[y, x, k] = mu[y, k, column]
+
+
+def visible_cost(
+    mu: NDArray[np.float32],
+    rho: NDArray[np.uint8],
+    space: DisparitySpace,
+    pairs: NDArray[np.int64],
+    view: int,
+    hidden: float,
+    threads: int = 1,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Dissimilarity on the pixel rays of a view, as far as the other views see the points.
+
+    cost(s) = (sum over pairs V_ij (1 - rho_ij) + PRIOR hidden) / (sum over pairs V_ij + PRIOR),
+    with V_ij the product of the visibilities of i and j but for `view` itself, whose ray is being
+    read. A plane does not hide the one behind it, as surfaces may lie between the two.
+
+    Parameters
+    ----------
+    rho
+        (rows, pairs, planes, columns) similarities in 255ths.
+    hidden
+        The cost of a point that no pair sees.
+
+    Returns
+    -------
+    Two (H, W, planes) float32 arrays: the cost and mu.
+    """
+    cost = np.empty((space.rows, space.width, space.planes), np.float32)
+    material = np.empty_like(cost)
+    q, kind = space.fineness, np.float32
+
+    def fill(top: int, end: int) -> None:
+        _visible_cost(
+            mu, rho, pairs, space.views, view, space.first, space.origin, q, kind(hidden), kind(PRIOR), top, end, cost,
+            material,
+        )  # fmt: skip
+
+    over_rows(fill, space.rows, threads)
+    return cost, material
