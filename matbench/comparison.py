@@ -91,6 +91,7 @@ class Comparison:
                 maps=disparity,
                 scenes=self.scenes,
                 facts=machine(),
+                higher=frozenset(m.name for m in scoring.metrics() if m.better == "higher"),
             ),
         )
         return path

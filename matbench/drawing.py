@@ -1,85 +1,23 @@
-"""Maps, volumes and surfaces as bounded arrays of bytes and points: what recordings show.
+"""Volumes and surfaces as bounded arrays of bytes and points: what recordings show.
 
-Nothing here knows the viewer. Disparity maps of one scene share one scale.
+Nothing here knows the viewer.
 """
 
-from functools import cache
 from math import ceil
 
-import matplotlib as mpl
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from matbench.coloring import disparity_colors
 from matbench.scene import Scene
 from matbench.space import DisparitySpace, Volume, visibility
-
-UNKNOWN = (128, 128, 128)  # where the truth is not known
-WORST = 4.0  # px of the pair: errors from here on have the last colour
 
 VOLUME_BYTES = 3 * 2**19  # one recorded volume: 1.5 MiB
 SLICE_PIXELS = 150_000
 DEEPEST = 6.0  # farthest depth over nearest depth of a drawn range of disparities
 
 Eye = tuple[tuple[float, float, float], tuple[float, float, float]]  # position and target
-
-
-@cache
-def _colormap(name: str) -> NDArray[np.uint8]:
-    """(256, 3) colours of a perceptually uniform map."""
-    return np.asarray(np.round(mpl.colormaps[name](np.arange(256))[:, :3] * 255), np.uint8)
-
-
-def stripes(rows: int, columns: int) -> NDArray[np.uint8]:
-    """(rows, columns, 3) diagonal stripes of two light greys: no answer, for every kind of eye."""
-    period = max(4, max(rows, columns) // 36)
-    light = (np.add.outer(np.arange(rows), np.arange(columns)) % period) * 2 >= period
-    return np.repeat(np.where(light, 250, 196).astype(np.uint8)[:, :, None], 3, axis=2)
-
-
-def colors(values: NDArray[np.floating], ends: tuple[float, float], name: str) -> NDArray[np.uint8]:
-    """(H, W, 3) colours of (H, W) numbers between two ends; NaN is striped."""
-    known = np.isfinite(values)
-    scaled = (np.where(known, values, ends[0]) - ends[0]) / max(ends[1] - ends[0], 1e-9)
-    picture = stripes(*values.shape)
-    picture[known] = _colormap(name)[np.clip(np.rint(scaled[known] * 255), 0, 255).astype(np.uint8)]
-    return picture
-
-
-def disparity_ends(scene: Scene) -> tuple[float, float]:
-    """What the first and the last colour of all disparity maps of a scene stand for.
-
-    The ends of the reference view's truth, else of the range to search.
-    """
-    truth = scene.truth.get(scene.ref)
-    if truth is not None and np.isfinite(truth).any():
-        return float(np.nanmin(truth)), float(np.nanmax(truth))
-    return scene.disparities.least, scene.disparities.largest
-
-
-def disparity_colors(disparity: NDArray[np.floating], ends: tuple[float, float]) -> NDArray[np.uint8]:
-    """(H, W, 3) viridis: far is dark blue, near is yellow, no answer striped."""
-    return colors(disparity, ends, "viridis")
-
-
-def truth_colors(truth: NDArray[np.floating], ends: tuple[float, float]) -> NDArray[np.uint8]:
-    """(H, W, 3) as `disparity_colors`; grey where the truth is not known."""
-    picture = colors(truth, ends, "viridis")
-    picture[~np.isfinite(truth)] = UNKNOWN
-    return picture
-
-
-def error_map(estimate: NDArray[np.float32], truth: NDArray[np.float32], pair_steps: float) -> NDArray[np.float32]:
-    """(H, W) error in pixels of the pair; NaN without an answer or without truth."""
-    error: NDArray[np.float32] = np.abs(estimate - truth) * np.float32(pair_steps)
-    return error
-
-
-def error_colors(error: NDArray[np.float32], truth: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """(H, W, 3) magma from 0 to `WORST` px of the pair; no answer is striped, unknown truth grey."""
-    picture = colors(error, (0.0, WORST), "magma")
-    picture[~np.isfinite(truth)] = UNKNOWN
-    return picture
 
 
 def step_within(height: int, width: int, pixels: int) -> int:

@@ -46,7 +46,7 @@ from attrs import define, field
 from numpy.typing import NDArray
 from rerun.error_utils import RerunWarning
 
-from matbench import blueprint, drawing
+from matbench import blueprint, coloring, drawing
 from matbench.algorithm import Estimate, Probe
 from matbench.blueprint import Contents, EntityPath
 from matbench.drawing import Perspective, Reduced
@@ -187,7 +187,7 @@ class _Writer:
 
     @property
     def ends(self) -> tuple[float, float]:
-        return drawing.disparity_ends(self.scene)
+        return coloring.disparity_ends(self.scene)
 
     def picture(self, *path: str, picture: NDArray[np.uint8], step: int | None = None) -> EntityPath:
         return self.log(*path, what=rr.Image(picture), step=step)
@@ -206,7 +206,7 @@ class _Writer:
         self.log(*contents.reference, "row", what=line)
         if scene.ref in scene.truth:
             truth = drawing.thinned(scene.truth[scene.ref], PICTURE_PIXELS)
-            colors = drawing.truth_colors(truth, self.ends)
+            colors = coloring.truth_colors(truth, self.ends)
             self.picture("truth", "disparity", picture=colors)
             contents.truth = True
         if scene.regions:
@@ -220,11 +220,10 @@ class _Writer:
         """The map, its error and the surface."""
         scene, contents = self.scene, self.contents
         small = drawing.thinned(disparity, PICTURE_PIXELS)
-        self.picture("estimate", "disparity", picture=drawing.disparity_colors(small, self.ends))
+        self.picture("estimate", "disparity", picture=coloring.disparity_colors(small, self.ends))
         if contents.truth:
             truth = drawing.thinned(scene.truth[scene.ref], PICTURE_PIXELS)
-            error = drawing.error_map(small, truth, scene.pair_steps)
-            self.picture("estimate", "error", picture=drawing.error_colors(error, truth))
+            self.picture("estimate", "error", picture=coloring.error_colors(small, truth, scene.pair_steps))
         perspective = Perspective.of(scene)
         points, colors, radii = perspective.surface(disparity, POINTS)
         self.log("surface", what=rr.ViewCoordinates.RDF)
@@ -260,7 +259,7 @@ class _Writer:
                 picture = drawing.upright(drawing.sign_colors(frame.derivative))
                 self.picture("slices", "derivative", picture=picture, step=frame.step)
             if frame.disparity is not None:
-                picture = drawing.disparity_colors(frame.disparity, self.ends)
+                picture = coloring.disparity_colors(frame.disparity, self.ends)
                 self.picture("passes", "disparity", picture=picture, step=frame.step)
         contents.maps = any(frame.disparity is not None for frame in frames)
         if all(frame.materiality is None for frame in frames) and estimate.volume is not None:
@@ -306,7 +305,7 @@ class _Writer:
 
 def _about(scene: Scene, title: str, row: int) -> str:
     """How to read the recording, as markdown."""
-    ends = drawing.disparity_ends(scene)
+    ends = coloring.disparity_ends(scene)
     seen = f"{scene.n} views of {scene.width}x{scene.height} px, reference view {scene.labels[scene.ref]}"
     return f"""# {title}
 
@@ -315,7 +314,7 @@ make the pair in whose pixels errors are given.
 
 - **Disparity**: {ends[0]:.4g} (dark blue, far) to {ends[1]:.4g} (yellow, near); striped: no answer, grey: truth
   unknown.
-- **Error**: 0 (black) to {drawing.WORST:g} px of the pair and more (pale); striped: no answer, grey: truth unknown.
+- **Error**: 0 (black) to {coloring.WORST:g} px of the pair and more (pale); striped: no answer, grey: truth unknown.
 - **Epipolar slices** of row {row}, the yellow line in the reference view. Columns are those of the leftmost
   view, beyond its frame too; disparity grows upward. Similarity: three pairs of views as red, green and blue.
   Materiality: white is high. Derivative of the energy: red negative (materiality wants to grow), blue

@@ -1,10 +1,9 @@
-"""Pictures for the page: disparity and error maps, colour bars, accuracy against seconds."""
+"""Pictures for the page: encoded maps, colour bars, accuracy against seconds."""
 
 import io
 import re
 from base64 import b64encode
 from collections.abc import Sequence
-from functools import cache
 from typing import TYPE_CHECKING
 
 import cv2
@@ -12,65 +11,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from matbench.coloring import palette
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DISPARITY, ERROR = "viridis", "magma"
-ERROR_LIMIT = 4.0  # pixels of the pair
 SIDE = 512  # px; larger pictures are made smaller
 LEVELS = 128  # steps of a colour scale: no eye sees them, and files are a quarter smaller
-UNKNOWN = 128  # grey of unknown truth; neither colour map has a grey
-_HATCH = (196, 250)  # two greys in stripes: no answer
 _INK = "#01fe02"  # stands for the page's text colour until the SVG is written
-
-
-@cache
-def colours(name: str) -> NDArray[np.uint8]:
-    """(256, 3) RGB of one of matplotlib's colour maps."""
-    from matplotlib import colormaps
-
-    table: NDArray[np.float64] = np.rint(255 * colormaps[name](np.arange(256))[:, :3])
-    return table.astype(np.uint8)
-
-
-def hatch(rows: int, columns: int) -> NDArray[np.uint8]:
-    """(rows, columns, 3) diagonal stripes, about 36 across the longer side."""
-    period = max(4, max(rows, columns) // 36)
-    stripe = (np.add.outer(np.arange(rows), np.arange(columns)) % period) * 2 >= period
-    return np.repeat(np.where(stripe, *_HATCH).astype(np.uint8)[..., None], 3, axis=2)
-
-
-def coloured(values: NDArray[np.floating], low: float, high: float, name: str) -> NDArray[np.uint8]:
-    """(H, W) numbers -> (H, W, 3) RGB on a scale from `low` to `high`; stripes where NaN."""
-    steps = (LEVELS - 1) / (high - low) if high > low else 0.0
-    known = ~np.isnan(values)
-    index = np.clip((np.where(known, values, low) - low) * steps + 0.5, 0, LEVELS - 1).astype(np.uint8)
-    palette = colours(name)[np.linspace(0, 255, LEVELS).round().astype(int)]
-    return np.where(known[..., None], palette[index], hatch(*values.shape))
-
-
-def disparity_map(disparity: NDArray[np.float32], low: float, high: float, is_truth: bool = False) -> NDArray[np.uint8]:
-    """(H, W, 3) RGB of a disparity map; without an answer striped, unknown truth plain grey."""
-    picture = coloured(disparity, low, high, DISPARITY)
-    if is_truth:
-        picture[np.isnan(disparity)] = UNKNOWN
-    return picture
-
-
-def error_map(disparity: NDArray[np.float32], truth: NDArray[np.float32], pair_steps: float) -> NDArray[np.uint8]:
-    """(H, W, 3) RGB of |disparity - truth| in pixels of the pair, from 0 to `ERROR_LIMIT`."""
-    picture = coloured(np.abs(disparity - truth) * pair_steps, 0, ERROR_LIMIT, ERROR)
-    picture[np.isnan(truth)] = UNKNOWN
-    return picture
-
-
-def scale(truth: NDArray[np.float32] | None, least: float, largest: float) -> tuple[float, float]:
-    """The ends of a scene's disparity scale: those of its truth, else of its search range."""
-    if truth is not None and np.isfinite(truth).any():
-        known = truth[np.isfinite(truth)]
-        least, largest = float(known.min()), float(known.max())
-    return (least, largest) if largest > least else (least - 0.5, least + 0.5)
 
 
 def _smaller(picture: NDArray[np.uint8], exact: bool) -> NDArray[np.uint8]:
@@ -95,8 +44,7 @@ def data_uri(picture: NDArray[np.uint8], exact: bool = True) -> str:
 
 def gradient(name: str, stops: int = 17) -> str:
     """A colour map as stops of a CSS gradient."""
-    picked = colours(name)[np.linspace(0, 255, stops).round().astype(int)]
-    return ", ".join("#{:02x}{:02x}{:02x}".format(*map(int, c)) for c in picked)
+    return ", ".join("#{:02x}{:02x}{:02x}".format(*map(int, c)) for c in palette(name, stops))
 
 
 def _printable(name: str, longest: int = 44) -> str:

@@ -14,6 +14,7 @@ import pandas as pd
 from attrs import evolve
 from markupsafe import Markup, escape
 
+from matbench import coloring
 from matbench.reports import figures, tables
 from matbench.reports.content import Report
 from matbench.reports.tables import FEW, METRIC, REGION, Shared
@@ -62,9 +63,9 @@ def render(report: Report) -> str:
         data=_data(report, scope),
         figure=_figure(rows),
         scenes=_scenes(report, scope),
-        disparity_bar=figures.gradient(figures.DISPARITY),
-        error_bar=figures.gradient(figures.ERROR),
-        error_limit=figures.ERROR_LIMIT,
+        disparity_bar=figures.gradient(coloring.DISPARITY),
+        error_bar=figures.gradient(coloring.ERROR),
+        error_limit=coloring.WORST,
         bad=_records(report.cells[report.cells["status"] != "ok"], ("method", "scene", "seed", "status", "reason")),
         methods=_methods(report.cells),
     )
@@ -172,7 +173,7 @@ def _scenes(report: Report, scope: Shared) -> Iterator[dict[str, Any]]:
             yield {"name": name, "known": False}
             continue
         truth = scene.truth.get(scene.ref)
-        low, high = figures.scale(truth, scene.disparities.least, scene.disparities.largest)
+        low, high = coloring.disparity_ends(scene)
         yield {
             "name": name,
             "known": True,
@@ -184,7 +185,7 @@ def _scenes(report: Report, scope: Shared) -> Iterator[dict[str, Any]]:
             "view": figures.data_uri(scene.views[scene.ref], exact=False),
             "truth": None
             if truth is None
-            else figures.data_uri(figures.disparity_map(truth, low, high, is_truth=True)),
+            else figures.data_uri(coloring.truth_colors(truth, (low, high), figures.LEVELS)),
             "methods": _all_pictures(report, scene, cells, (low, high)),
         }
 
@@ -219,10 +220,10 @@ def _pictures(report: Report, scene: Scene, cell: dict[str, Any], ends: tuple[fl
     if disparity is None:
         return out
     disparity = disparity.astype(np.float32, copy=False)
-    out["disparity"] = figures.data_uri(figures.disparity_map(disparity, *ends))
+    out["disparity"] = figures.data_uri(coloring.disparity_colors(disparity, ends, figures.LEVELS))
     truth = scene.truth.get(scene.ref)
     if truth is not None:
-        out["error"] = figures.data_uri(figures.error_map(disparity, truth, scene.pair_steps))
+        out["error"] = figures.data_uri(coloring.error_colors(disparity, truth, scene.pair_steps, figures.LEVELS))
     rows = report.results
     rows = rows[
         (rows["method"] == cell["method"])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from matbench import drawing, recording
+from matbench import coloring, drawing, recording
 from matbench.algorithm import Context, Estimate, Probe
 from matbench.errors import UserError
 from matbench.recording import RecordingError, RecordingProbe, record, view
@@ -187,10 +187,10 @@ def test_volumes_have_the_type_uint8(path: Path) -> None:
 
 def test_maps_have_the_colours_of_their_numbers(rows: dict[str, list[Row]], told: tuple[Scene, Teller]) -> None:
     scene, teller = told
-    truth, ends = scene.truth[1], drawing.disparity_ends(scene)
+    truth, ends = scene.truth[1], coloring.disparity_ends(scene)
     assert ends == (2, 6)
     shown = picture(rows["/estimate/disparity"][0][1])
-    assert np.array_equal(shown, drawing.disparity_colors(teller.answer, ends))
+    assert np.array_equal(shown, coloring.disparity_colors(teller.answer, ends))
     assert set(np.unique(shown[3:6, :5])) <= {196, 250}  # no answer: stripes
     true = picture(rows["/truth/disparity"][0][1])
     assert (true[0] == 128).all()
@@ -200,7 +200,7 @@ def test_maps_have_the_colours_of_their_numbers(rows: dict[str, list[Row]], told
     wrong = 2 * np.abs(teller.answer - truth)
     assert (error[0] == 128).all()
     assert (error[wrong >= 4] == (252, 253, 191)).all()
-    assert np.array_equal(picture(rows["/passes/disparity"][3][1]), drawing.disparity_colors(teller.maps[3], ends))
+    assert np.array_equal(picture(rows["/passes/disparity"][3][1]), coloring.disparity_colors(teller.maps[3], ends))
     mask = picture(rows["/regions/nonocc"][0][1], "SegmentationImage")[:, :, 0]
     assert np.array_equal(mask == 1, scene.regions["nonocc"])
     assert np.array_equal(picture(rows["/views/im6"][0][1]), scene.views[3])

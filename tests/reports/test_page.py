@@ -123,25 +123,8 @@ def decoded(uri: str) -> np.ndarray[Any, np.dtype[np.uint8]]:
     return bgr[..., ::-1].astype(np.uint8)
 
 
-def test_no_answer_and_unknown_truth_differ_from_every_colour() -> None:
-    truth = np.array([[1, 2, np.nan, 1]], np.float32).repeat(8, axis=0)
-    answer = np.array([[1, np.nan, 2, 9]], np.float32).repeat(8, axis=0)
-    picture = decoded(figures.data_uri(figures.error_map(answer, truth, 2.0)))
-    assert (picture[:, 0] == figures.colours("magma")[0]).all()
-    assert (picture[:, 3] == figures.colours("magma")[255]).all()
-    assert (picture[:, 2] == figures.UNKNOWN).all()
-    assert set(map(tuple, picture[:, 1].tolist())) == {(196, 196, 196), (250, 250, 250)}
-
-
 def test_large_pictures_are_made_smaller() -> None:
     assert decoded(figures.data_uri(np.zeros((300, 1024, 3), np.uint8))).shape == (150, 512, 3)
-
-
-def test_one_scale_for_a_scene(report: Report) -> None:
-    truth = next(iter(report.scenes.values())).truth[1]
-    assert figures.scale(truth, 0, 9) == (1.0, 4.0)
-    assert figures.scale(None, 0, 9) == (0, 9)
-    assert figures.scale(np.full((2, 2), 3, np.float32), 0, 9) == (2.5, 3.5)
 
 
 def test_the_figure_takes_names_literally(report: Report) -> None:
