@@ -211,3 +211,23 @@ def test_timings_and_memory_are_measured(tmp_path: Path) -> None:
     row = cells(tmp_path).loc["flat"]
     assert 0 < float(row.seconds) < 5
     assert 10 < float(row.peak_mb) < 2000
+
+
+def test_recordings_are_written_on_request_and_found_by_name(tmp_path: Path) -> None:
+    compare(tmp_path, "flat", "noise")
+    store = comparison.Store(tmp_path / "run")
+    with pytest.raises(UserError, match="has no recordings"):
+        store.recording()
+    scores = (tmp_path / "run" / "results.csv").read_bytes()
+    compare(tmp_path, "flat", "noise", record=True)
+    assert (tmp_path / "run" / "results.csv").read_bytes() == scores
+    with pytest.raises(UserError, match="there are 2 recordings: name one cell of flat on"):
+        store.recording()
+    with pytest.raises(UserError, match="0 recordings match 'sgbm'"):
+        store.recording("sgbm")
+    found = store.recording("flat")
+    assert found.name == "recording.rrd"
+    assert store.recording(found.parent.name) == found
+    before = found.stat().st_mtime_ns
+    compare(tmp_path, "flat", "noise", record=True)
+    assert found.stat().st_mtime_ns == before
