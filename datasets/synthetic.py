@@ -138,13 +138,13 @@ def _noise(seed: int, view: int, shape: tuple[int, ...], deviation: float) -> ND
 
 def _number(called: str, options: Mapping[str, str], key: str, default: int, least: int, largest: int) -> int:
     text = options.get(key, str(default))
-    if not re.fullmatch(r"\d{1,10}", text) or not least <= int(text) <= largest:
+    if not re.fullmatch(r"[0-9]{1,10}", text) or not least <= int(text) <= largest:
         raise UserError(f"{key}={text} of {called}: a whole number from {least} to {largest} is possible")
     return int(text)
 
 
 def _read_size(called: str, text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
+    found = re.fullmatch(r"([0-9]{1,4})x([0-9]{1,4})", text)
     width, height = (int(found[1]), int(found[2])) if found else (0, 0)
     if not (32 <= width <= 1920 and 24 <= height <= min(1440, 2 * width)):
         raise UserError(
@@ -155,7 +155,7 @@ def _read_size(called: str, text: str) -> tuple[int, int]:
 
 
 def _read_noise(called: str, text: str) -> float:
-    if not re.fullmatch(r"\d{1,2}(\.\d{1,6})?", text) or float(text) > 50:
+    if not re.fullmatch(r"[0-9]{1,2}(\.[0-9]{1,6})?", text) or float(text) > 50:
         raise UserError(f"noise={text} of {called}: grey levels from 0 to 50 are possible, such as 1.5")
     return float(text)
 

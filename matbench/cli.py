@@ -1,19 +1,29 @@
-"""The command line: `matbench compare`, `list` and `view`. Heavy imports happen where they are used."""
+"""The command line: `matbench compare`, `ablate`, `list` and `view`. Heavy imports happen where they are used."""
 
 import json
+import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
-from rich.console import Console
+from rich import console as rich_console
 
 from matbench._version import __version__
 from matbench.errors import UserError
 
 if TYPE_CHECKING:
     from matbench.comparison import Comparison
+
+
+class Console(rich_console.Console):
+    """A console that leaves a broken pipe to `main`."""
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError
+
 
 DONE, CELLS_FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
@@ -48,6 +58,11 @@ def _many(short: str, long: str, text: str) -> Parameter:
     return Parameter(name=[long, short], consume_multiple=True, negative="", help=text)
 
 
+Seeds = Annotated[
+    list[str] | None, Parameter(consume_multiple=True, negative="", help="Whole number, one or several; default 0.")
+]
+
+
 @app.command
 def compare(
     *,
@@ -62,9 +77,7 @@ def compare(
     data: Data = None,
     out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,
     record: Annotated[bool, Parameter(negative="", help="Also write a recording of every cell for `view`.")] = False,
-    seed: Annotated[
-        list[int] | None, Parameter(consume_multiple=True, negative="", help="Seed, one or several; default 0.")
-    ] = None,
+    seed: Seeds = None,
     plugin: Plugins = None,
     metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1",
 ) -> int:
@@ -81,29 +94,95 @@ def compare(
 
     `matbench compare -a 'okutomi_kanade[window=3,5,7]' -s 'synthetic/*' -m bad_2`
     """
-    from matbench import comparison, scoring
+    from matbench import comparison
+
+    _check_metric(metric)
+    if scene is None:
+        _say_missing(comparison.default_scenes(data)[1], data)
+    ready = comparison.prepare(
+        algorithm, scene, data=data, out=out, record=record, seed=_whole(seed), plugin=plugin or ()
+    )
+    return _work(ready, metric)
+
+
+@app.command
+def ablate(
+    selector: str,
+    *,
+    scene: Annotated[
+        list[str] | None, _many("-s", "--scene", "Scene or pattern, as for `compare`; the more, the better.")
+    ] = None,
+    data: Data = None,
+    out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,
+    seed: Seeds = None,
+    plugin: Plugins = None,
+    metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1",
+) -> int:
+    """Run every combination of a method's parameters and tell what each factor does.
+
+    Differences are paired by scene, all else equal; intervals and effect sizes are over scenes.
+    The first value of a parameter is the base that the others are compared with.
+
+    Parameters
+    ----------
+    selector
+        Method with several values for its parameters, or a TOML file with `algorithms` and `scenes`.
+
+    **Examples**
+
+    `matbench ablate 'materiality[pairs=all,consecutive binarization=plane,volume]' -s 'middlebury*/*' --data DATA`
+
+    `matbench ablate ablations/pairs.toml --data DATA`
+    """
+    from matbench import ablation, comparison
+    from matbench.plan import methods
+
+    _check_metric(metric)
+    algorithms: list[str] = [selector]
+    if selector.endswith(".toml"):
+        algorithms, listed = comparison.read_request(Path(selector))
+        scene = scene or listed
+    ablation.factors(methods(algorithms, plugin or ()))
+    ready = comparison.prepare(algorithms, scene, data=data, out=out, seed=_whole(seed), plugin=plugin or ())
+    return _work(ready, metric, is_ablation=True)
+
+
+def _whole(seeds: list[str] | None) -> list[int]:
+    """Seeds as typed; a seed that is no whole number is refused, not rounded."""
+    for seed in seeds or ():
+        if not re.fullmatch(r"[0-9]{1,9}", seed):
+            raise UserError(f"seed {seed!r} is not a whole number from 0 to 999999999")
+    return [int(seed) for seed in seeds or ("0",)]
+
+
+def _check_metric(metric: str) -> None:
+    from matbench import scoring
     from matbench.errors import unknown
 
-    console = Console(stderr=False)
     names = [m.name for m in scoring.metrics()]
     if metric not in names:
         raise unknown("metric", metric, names)
-    if scene is None:
-        _say_missing(comparison.default_scenes(data)[1], data)
-    ready = comparison.prepare(algorithm, scene, data=data, out=out, record=record, seed=seed or 0, plugin=plugin or ())
+
+
+def _work(ready: "Comparison", metric: str, is_ablation: bool = False) -> int:
+    """Run, print and report a comparison; the exit status."""
+    console = Console()
     stopped = _run(ready, console)
     results, cells = ready.tables()
-    report = ready.report(results, cells)
-    _print_tables(results, cells, metric, console)
-    failed = cells[~cells["status"].isin(["ok", "skipped"])]
-    for what, path in (("scores", ready.folder / "results.csv"), ("report", report)):
+    switches = ready.ablation(results) if is_ablation else None
+    report = ready.report(results, cells, switches)
+    _print_tables(results, cells, switches, metric, console)
+    written = {"scores": ready.folder / "results.csv", "report": report}
+    if is_ablation:
+        written["ablation"] = ready.folder / "ablation.csv"
+    for what, path in written.items():
         console.print(f"{what}: {path}", markup=False, highlight=False, soft_wrap=True)
-    if record:
+    if any(ready.folder.glob("cells/*/recording.rrd")):
         console.print(f"recordings: matbench view {ready.folder}", markup=False, highlight=False, soft_wrap=True)
     if stopped:
         console.print("interrupted: the same command goes on from here")
         return INTERRUPTED
-    return CELLS_FAILED if len(failed) else DONE
+    return DONE if cells["status"].isin(["ok", "skipped"]).all() else CELLS_FAILED
 
 
 def _say_missing(missing: Sequence[str], data: Path | None) -> None:
@@ -135,8 +214,9 @@ def _run(ready: "Comparison", console: Console) -> bool:
                 progress.update(task, description=escape(str(cell)))
                 return
             progress.advance(task)
-            took = f" {outcome.seconds:.2f} s" if outcome.seconds is not None else f" {outcome.reason}"
-            if not console.is_terminal or outcome.status != "ok":
+            took = f" {outcome.seconds:.2f} s" if outcome.seconds is not None else ""
+            took += f" {outcome.reason}" if outcome.reason else ""
+            if not console.is_terminal or outcome.reason:
                 line = f"{outcome.status:>7}  {cell}{took}"
                 progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
@@ -147,11 +227,16 @@ def _run(ready: "Comparison", console: Console) -> bool:
     return False
 
 
-def _print_tables(results: Any, cells: Any, metric: str, console: Console) -> None:
+def _print_tables(results: Any, cells: Any, switches: Any, metric: str, console: Console) -> None:
+    from matbench import scoring
+    from matbench.reports import switches as effects
     from matbench.reports import tables
 
-    for table in tables.terminal(results, cells, metric):
+    higher = next(m.better for m in scoring.metrics() if m.name == metric) == "higher"
+    for table in tables.terminal(results, cells, metric, higher, console.width):
         console.print(table)
+    if switches is not None:
+        console.print(effects.terminal(switches, metric))
 
 
 @app.command(name="list")
@@ -219,10 +304,13 @@ def main(tokens: Sequence[str] | None = None) -> None:
     except CycloptsError as error:
         status = _refuse(" ".join(str(error).split()))
     except KeyboardInterrupt:
+        print("matbench: interrupted", file=sys.stderr)
         status = INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()
+    except BrokenPipeError:  # whoever read the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = DONE
+    except OSError as error:
+        status = _refuse(f"{error.filename or 'output'}: {error.strerror}")
     sys.exit(status)
 
 

@@ -1,19 +1,23 @@
 """A whole comparison: choose methods and scenes, run, score, report. Where the parts are put together."""
 
+import operator
 import platform
 import shlex
 import sys
+import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from matbench import plugins, run, scoring
 from matbench._version import __version__
 from matbench.dataset import Listing
-from matbench.errors import UserError
+from matbench.errors import UserError, unknown
 from matbench.plan import Plan, make_plan, methods
 from matbench.scene import Scene
 from matbench.scenes import data_root, listings, load_scene, select
@@ -63,18 +67,28 @@ class Comparison:
         """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
         results = scoring.results(self.plan, self.store, self.scenes)
         cells = scoring.cells(self.plan, self.store)
-        write_text(self.folder / "results.csv", results.to_csv(index=False))
-        write_text(self.folder / "cells.csv", cells.to_csv(index=False))
+        for name, table in (("results.csv", results), ("cells.csv", cells)):
+            write_text(self.folder / name, table.to_csv(index=False))
         return results, cells
 
-    def report(self, results: "pd.DataFrame", cells: "pd.DataFrame") -> Path:
+    def ablation(self, results: "pd.DataFrame") -> "pd.DataFrame":
+        """What each factor does; written as ``ablation.csv`` and ``ablation.tex``, too."""
+        from matbench.ablation import ablation
+        from matbench.reports import switches
+
+        table = ablation(self.plan, results)
+        write_text(self.folder / "ablation.csv", table.to_csv(index=False))
+        write_text(self.folder / "ablation.tex", switches.latex(table))
+        return table
+
+    def report(self, results: "pd.DataFrame", cells: "pd.DataFrame", ablation: "pd.DataFrame | None" = None) -> Path:
         """Write ``report.html``."""
         from matbench.reports import page
 
         stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.cells}
         path = self.folder / "report.html"
 
-        def disparity(algorithm: str, params: str, scene: str, seed: int):  # type: ignore[no-untyped-def]
+        def disparity(algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
             cell = stored[algorithm, params, scene, seed]
             outcome = self.store.outcome(cell)
             if outcome is None or outcome.status != "ok":
@@ -91,6 +105,7 @@ class Comparison:
                 maps=disparity,
                 scenes=self.scenes,
                 facts=machine(),
+                ablation=ablation,
                 higher=frozenset(m.name for m in scoring.metrics() if m.better == "higher"),
             ),
         )
@@ -132,6 +147,41 @@ def default_scenes(data: str | Path | None = None) -> tuple[list[str], list[str]
     return synthetic + paper, [name for name in PAPER_SCENES if name not in present]
 
 
+def read_request(path: Path) -> tuple[list[str], list[str] | None]:
+    """Selectors of algorithms and scenes from a TOML file; None where it names no scenes.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, is no TOML, or holds something else than the two lists.
+    """
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise UserError(f"{path} is not TOML: {error}") from error
+    for key, value in found.items():
+        if key not in ("algorithms", "scenes"):
+            raise unknown(f"key in {path}", key, ("algorithms", "scenes"))
+        if not (isinstance(value, list) and value and all(isinstance(one, str) for one in value)):
+            raise UserError(f"{path}: {key} is {value!r}, not a list of texts such as {key} = ['...']")
+    if "algorithms" not in found:
+        raise UserError(f"{path} names no algorithms: write algorithms = ['materiality[pairs=all,consecutive]']")
+    return found["algorithms"], found.get("scenes")
+
+
+def _seeds(seed: object) -> list[int]:
+    given = list(seed) if isinstance(seed, list | tuple | range) else [seed]
+    try:
+        found = [operator.index(one) for one in given if not isinstance(one, bool)]  # type: ignore[arg-type]
+    except TypeError:
+        found = []
+    if len(found) != len(given) or not found or min(found) < 0:
+        raise UserError(f"seed {seed!r} is not one or several whole numbers from 0")
+    return list(dict.fromkeys(found))
+
+
 def prepare(
     algorithms: str | Sequence[str] | None = None,
     scenes: str | Sequence[str] | None = None,
@@ -140,32 +190,33 @@ def prepare(
     out: str | Path | None = None,
     record: bool = False,
     seed: int | Sequence[int] = 0,
-    plugin: Sequence[str | Path] = (),
+    plugin: str | Path | Sequence[str | Path] = (),
     command: str | None = None,
 ) -> Comparison:
     """Check everything that was asked for, read every scene, and only then write the plan.
 
     Parameters are those of `compare`.
     """
-    files = [Path(file).resolve() for file in plugin]
-    seeds = [seed] if isinstance(seed, int) else list(dict.fromkeys(seed))
-    if not seeds or min(seeds) < 0:
-        raise UserError(f"seed {seeds or 'none'}: give whole numbers from 0")
+    files = [Path(file).resolve() for file in ([plugin] if isinstance(plugin, str | Path) else plugin)]
+    seeds = _seeds(seed)
     own = [p.name for file in files for p in plugins.from_file(file).values()]
     chosen = methods(algorithms if algorithms is not None else [*default_algorithms(), *own], files)
     root = data_root(data)
     names = select(scenes, root) if scenes is not None else default_scenes(root)[0]
     if not chosen or not names:
         raise UserError("nothing to compare: name at least one algorithm and one scene")
-    loaded = {}
+    loaded: dict[tuple[str, str], Scene] = {}  # a scene spelled in two ways is one scene
     for name in names:
         scene = load_scene(name, root)
-        loaded[scene.name] = scene
-    plan = make_plan(chosen, loaded, seeds, files)
+        if scene.ref not in scene.truth:
+            raise UserError(f"{name} has no ground truth of its reference view {scene.labels[scene.ref]}: no scores")
+        loaded.setdefault((scene.digest, scene.truth_digest), scene)
+    by_name = {scene.name: scene for scene in loaded.values()}
+    plan = make_plan(chosen, by_name, seeds, files)
     folder = Path(out) if out is not None else RUNS / plan.digest
     store = Store.open(folder, plan)
     said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
-    return Comparison(plan, store, loaded, root, record, said)
+    return Comparison(plan, store, by_name, root, record, said)
 
 
 def compare(
@@ -176,7 +227,7 @@ def compare(
     out: str | Path | None = None,
     record: bool = False,
     seed: int | Sequence[int] = 0,
-    plugin: Sequence[str | Path] = (),
+    plugin: str | Path | Sequence[str | Path] = (),
 ) -> "pd.DataFrame":
     """Run methods on scenes and score them; the run folder stays for `matbench view` and the report.
 

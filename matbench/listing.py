@@ -18,7 +18,8 @@ def known(data: Path | None = None, files: Sequence[Path] = ()) -> dict[str, Any
     return {
         "algorithms": {name: _algorithm(plugin) for name, plugin in sorted(plugins.algorithms(files).items())},
         "scenes": {name: _scene(found) for name, found in listings(data).items()},
-        "metrics": {m.name: {"unit": m.unit, "better": m.better, "about": m.about} for m in scoring.metrics()},
+        "metrics": {m.name: {"unit": m.unit, "better": m.better, "about": m.about} for m in scoring.metrics()}
+        | {name: {"error": error} for name, error in scoring.broken_metrics().items()},
     }
 
 
@@ -26,18 +27,24 @@ def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
     facts: dict[str, Any] = {"source": plugin.source}
     try:
         cls = plugin.load()
+        if not isinstance(cls, type):
+            raise UserError(f"plug-in {plugin.name!r} from {plugin.source} is no class")
+        parameters = spec.parameters(cls)
     except UserError as error:
         return facts | {"error": str(error)}
-    parameters = spec.parameters(cls)
     empty = inspect.Parameter.empty
     return facts | {
         "about": (inspect.getdoc(cls) or "").split("\n\n")[0].replace("\n", " "),
-        "presets": sorted(getattr(cls, "presets", {})),
+        "presets": sorted(spec.presets_of(cls)),
         "parameters": {
-            name: {"type": spec.describe(kind), "default": None if default is empty else default}
+            name: {"type": spec.describe(kind), "default": None if default is empty else _plain(default)}
             for name, (kind, default) in parameters.items()
         },
     }
+
+
+def _plain(value: Any) -> Any:
+    return value if type(value) in (bool, int, float, str) else str(value)
 
 
 def _scene(found: Any) -> dict[str, Any]:
@@ -66,6 +73,9 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         scenes.add_row(escape(name), str(facts["views"]), sizes, "yes" if facts["present"] else "no")
     metrics = Table("metric", "unit", "better", "about", title="Metrics", title_justify="left")
     for name, facts in everything["metrics"].items():
+        if "error" in facts:
+            metrics.add_row(escape(name), "", "", f"[red]{escape(facts['error'])}[/]")
+            continue
         metrics.add_row(escape(name), facts["unit"], facts["better"], escape(facts["about"]))
     return [methods, scenes, metrics]
 

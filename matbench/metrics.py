@@ -1,5 +1,6 @@
 """Scores of a disparity map: shares in per cent, errors in pixels of the field's pair."""
 
+import warnings
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Literal
@@ -167,4 +168,15 @@ def score(
         raise ValueError(f"estimate is {estimate.shape}, truth {truth.shape}, region {mask.shape}: they must agree")
     errors = error_map(estimate, truth, pair_steps)[mask & np.isfinite(truth)]
     errors.setflags(write=False)
-    return {metric.name: metric.compute(errors) if errors.size else float("nan") for metric in metrics}
+    return {metric.name: _value(metric, errors) for metric in metrics}
+
+
+def _value(metric: Metric, errors: Errors) -> float:
+    """NaN for an empty region, and for a plug-in's metric that fails: it harms no other."""
+    if not errors.size:
+        return float("nan")
+    try:
+        return float(metric.compute(errors))
+    except Exception as error:
+        warnings.warn(f"metric {metric.name} failed: {type(error).__name__}: {error}", stacklevel=3)
+        return float("nan")

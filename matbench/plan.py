@@ -88,6 +88,7 @@ class Plan:
             "algorithms": [methods[name] for name in sorted(methods)],
             "scenes": sorted({c.scene for c in self.cells}),
             "seeds": sorted({c.seed for c in self.cells}),
+            "plugins": sorted(self.plugin_files),
         }
 
     @property

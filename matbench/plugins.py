@@ -1,12 +1,14 @@
 """Finding methods, datasets and metrics: through entry points, and in a user's own file."""
 
 import importlib.util
+import inspect
+import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -49,7 +51,9 @@ class Plugin:
             return self.entry
         try:
             return self.entry.load()
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever a module does when imported, sys.exit included
             why = f"{type(error).__name__}: {first_line(error)}"
             raise UserError(f"plug-in {self.name!r} from {self.source} cannot be imported: {why}") from error
 
@@ -71,7 +75,7 @@ def snake_case(name: str) -> str:
 
 
 def from_file(path: Path) -> Mapping[str, Plugin]:
-    """The methods in a user's own file: every class defined there that has a `solve`.
+    """The methods in a user's own file: every public, concrete class defined there that has a `solve`.
 
     A class is named after itself in snake case, or by its attribute `name`.
 
@@ -80,13 +84,14 @@ def from_file(path: Path) -> Mapping[str, Plugin]:
     UserError
         If the file is missing, fails to import, or holds no method.
     """
-    if not path.is_file():
-        raise UserError(f"plug-in file {str(path)!r} does not exist: give the path of a Python file")
+    if not os.path.isfile(path):  # noqa: PTH113 (False where a folder may not be entered, too)
+        raise UserError(f"plug-in file {str(path)!r} does not exist or may not be read: give the path of a Python file")
     module = _import_file(path)
     classes = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module.__name__]
     found = {}
     for cls in classes:
-        if callable(getattr(cls, "solve", None)):
+        is_hidden = cls.__name__.startswith("_") or inspect.isabstract(cls)
+        if callable(getattr(cls, "solve", None)) and not is_hidden:
             given = vars(cls).get("name")
             name = given if isinstance(given, str) else snake_case(cls.__name__)
             if not re.fullmatch(r"[A-Za-z0-9_.-]+", name):
@@ -98,7 +103,10 @@ def from_file(path: Path) -> Mapping[str, Plugin]:
 
 
 def _import_file(path: Path) -> ModuleType:
-    content = sha256(path.read_bytes()).hexdigest()[:16]
+    try:
+        content = sha256(path.read_bytes()).hexdigest()[:16]
+    except OSError as error:
+        raise UserError(f"plug-in file {str(path)!r} cannot be read: {error.strerror}") from error
     name = f"matbench_plugin_{path.stem}_{content}"
     if name in sys.modules:
         return sys.modules[name]
@@ -109,7 +117,9 @@ def _import_file(path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # sys.exit included
         del sys.modules[name]
         raise UserError(f"plug-in file {str(path)!r}: {type(error).__name__}: {first_line(error)}") from error
     return module
@@ -151,11 +161,7 @@ def code_digest(plugin: Plugin) -> str:
     all of `algorithms/`, and the modules of the harness that methods compute with); and the
     versions of numpy, numba and OpenCV.
     """
-    import cv2
-    import numba
-    import numpy as np
-
-    digest = sha256(f"numpy {np.__version__} numba {numba.__version__} opencv {cv2.__version__}".encode())
+    digest = sha256(_versions().encode())
     here = Path(__file__).parent
     files = [here / "scene.py", here / "space.py", here / "algorithm.py"]
     if isinstance(plugin.entry, type):
@@ -165,6 +171,22 @@ def code_digest(plugin: Plugin) -> str:
     for file in files:
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
+
+
+def _versions() -> str:
+    return " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "opencv-python-headless"))
+
+
+def kernel_cache() -> Path:
+    """Where compiled kernels are kept: a folder for each state of the built-in methods' code.
+
+    numba notices a change of a kernel's own file, not of one that it calls in another.
+    """
+    digest = sha256(_versions().encode())
+    for file in _package_files("matbench.algorithms"):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "matbench" / "kernels" / digest.hexdigest()[:16]
 
 
 def _package_files(module: str) -> list[Path]:

@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import TimeoutError as FutureTimeout
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
@@ -12,6 +12,7 @@ from typing import Literal
 
 from pebble import ProcessExpired, ProcessPool
 
+from matbench import plugins
 from matbench.plan import Cell, Plan
 from matbench.store import FINAL, Outcome, Store, write_cell
 from matbench.worker import Job, run_cell
@@ -48,6 +49,23 @@ def _without_main() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
+@contextmanager
+def _kernels_kept() -> Iterator[None]:
+    """Let the processes started meanwhile keep compiled kernels where no other code's are."""
+    before = os.environ.get("NUMBA_CACHE_DIR")
+    with suppress(OSError):  # without a folder to keep them in, kernels are compiled anew
+        place = plugins.kernel_cache()
+        place.mkdir(parents=True, exist_ok=True)
+        os.environ["NUMBA_CACHE_DIR"] = str(place)
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop("NUMBA_CACHE_DIR", None)
+        else:
+            os.environ["NUMBA_CACHE_DIR"] = before
+
+
 def run(
     plan: Plan,
     store: Store,
@@ -76,9 +94,9 @@ def run(
     if not todo:
         return
     store.sweep()
-    context = get_context("forkserver" if hasattr(os, "fork") else "spawn")
+    context = get_context("forkserver")
     context.set_forkserver_preload(["matbench.worker", *preload])
-    with _without_main(), ProcessPool(max_workers=1, max_tasks=1, context=context) as pool:
+    with _without_main(), _kernels_kept(), ProcessPool(max_workers=1, max_tasks=1, context=context) as pool:
         try:
             for cell in todo:
                 tell("start", cell, None)
@@ -88,6 +106,7 @@ def run(
         except BaseException:
             pool.stop()
             pool.join()
+            store.sweep()
             raise
 
 
@@ -107,4 +126,6 @@ def _finish(pool: ProcessPool, job: Job, store: Store) -> Outcome:
         with store.building(job.cell) as draft:
             write_cell(draft, job.cell, crashed)
         return crashed
+    except OSError as error:
+        return Outcome("failed", reason=f"its folder could not be written: {error}")
     return store.outcome(job.cell) or Outcome("failed", reason="the cell's process left no result")

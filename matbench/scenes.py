@@ -50,6 +50,8 @@ def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
             found |= {f"{prefix}/{listing.name}": listing for listing in plugin.load().listings(root)}
         except UserError as error:
             found[prefix] = error
+        except Exception as error:  # a plug-in's own failure harms no other
+            found[prefix] = UserError(f"dataset {prefix!r} from {plugin.source}: {type(error).__name__}: {error}")
     return found
 
 

@@ -1,7 +1,9 @@
 """Tables of a run, computed from its stored maps: no method runs again for a new metric."""
 
 from collections.abc import Mapping
+from functools import cache
 
+import numpy as np
 import pandas as pd
 
 from matbench import plugins
@@ -29,22 +31,32 @@ CELL_COLUMNS = (
 
 
 def metrics() -> tuple[Metric, ...]:
-    """Every metric that plug-ins offer, the built-in ones first.
+    """Every metric that plug-ins offer, the built-in ones first; broken plug-ins are left out."""
+    return _metrics()[0]
 
-    Raises
-    ------
-    UserError
-        If a plug-in cannot be imported, gives something else than metrics, or takes a name twice.
-    """
+
+def broken_metrics() -> Mapping[str, str]:
+    """The metric plug-ins that cannot be imported or give no new metrics, with what is wrong."""
+    return _metrics()[1]
+
+
+@cache
+def _metrics() -> tuple[tuple[Metric, ...], Mapping[str, str]]:
     found: dict[str, Metric] = {}
+    broken: dict[str, str] = {}
     by_source = sorted(plugins.installed("metrics").values(), key=lambda p: p.source != "matbench-stereo")
     for plugin in by_source:
-        loaded = plugin.load()
-        for metric in [loaded] if isinstance(loaded, Metric) else loaded:
-            if not isinstance(metric, Metric) or metric.name in found:
-                raise UserError(f"metric plug-in {plugin.name!r} from {plugin.source}: {metric!r} is no new Metric")
-            found[metric.name] = metric
-    return tuple(found.values())
+        try:
+            loaded = plugin.load()
+            offered = [loaded] if isinstance(loaded, Metric) else list(loaded)
+        except (UserError, TypeError) as error:
+            broken[plugin.name] = str(error)
+            continue
+        if all(isinstance(metric, Metric) and metric.name not in found for metric in offered):
+            found |= {metric.name: metric for metric in offered}
+        else:
+            broken[plugin.name] = f"plug-in {plugin.name!r} from {plugin.source} offers no Metric of a new name"
+    return tuple(found.values()), broken
 
 
 def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFrame:
@@ -62,7 +74,8 @@ def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFra
         for region, mask in scene.regions.items():
             values = score(estimate, truth, mask, scene.pair_steps, used)
             head = (cell.method.algorithm, cell.method.changed, cell.scene, scene.labels[scene.ref], cell.seed, region)
-            rows += [(*head, m.name, values[m.name], m.unit, int(mask.sum())) for m in used]
+            pixels = int((mask & np.isfinite(truth)).sum())
+            rows += [(*head, m.name, values[m.name], m.unit, pixels) for m in used]
     return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
 
 

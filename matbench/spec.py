@@ -16,7 +16,7 @@ from cattrs import Converter
 
 from matbench.errors import UserError, unknown
 
-Value = bool | int | float | str
+Value = bool | int | float | str | None
 
 
 @frozen
@@ -41,7 +41,7 @@ def label(name: str, options: Mapping[str, Value]) -> str:
 
 def text(options: Mapping[str, Value]) -> str:
     """``key=value ...`` as it is typed."""
-    return " ".join(f"{key}={str(v).lower() if isinstance(v, bool) else v}" for key, v in options.items())
+    return " ".join(f"{key}={str(v).lower() if v is None or isinstance(v, bool) else v}" for key, v in options.items())
 
 
 def parse(selector: str) -> list[Spec]:
@@ -104,6 +104,7 @@ def _converter() -> Converter:
     converter.register_structure_hook(int, _strict(int))
     converter.register_structure_hook(float, _strict(float))
     converter.register_structure_hook_func(_is_literal, _literal)
+    converter.register_structure_hook_func(lambda kind: kind is Any, lambda value, _: value)
     return converter
 
 
@@ -116,11 +117,32 @@ def describe(kind: Any) -> str:
 
 
 def parameters(cls: type) -> dict[str, tuple[Any, Any]]:
-    """Name -> (type, default) of every parameter of a method; `inspect.Parameter.empty` for none."""
-    hints = get_type_hints(vars(cls)["__init__"]) if "__init__" in vars(cls) else {}
-    signature = inspect.signature(cls)
+    """Name -> (type, default) of every parameter of a method; `inspect.Parameter.empty` for none.
+
+    Raises
+    ------
+    UserError
+        If they cannot be read, as with an annotation that names nothing.
+    """
+    try:
+        hints = get_type_hints(vars(cls)["__init__"]) if "__init__" in vars(cls) else {}
+        signature = inspect.signature(cls)
+    except (NameError, TypeError, ValueError, AttributeError) as error:
+        raise UserError(f"{cls!r} is no method: its parameters cannot be read: {first_line(error)}") from error
     kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
-    return {p.name: (hints.get(p.name, str), p.default) for p in signature.parameters.values() if p.kind in kinds}
+    taken = [p for p in signature.parameters.values() if p.kind in kinds]
+    return {p.name: (hints.get(p.name, _kind_of(p.default)), p.default) for p in taken}
+
+
+def _kind_of(default: object) -> Any:
+    """The type of a parameter that has no annotation: that of its default, if it is a simple one."""
+    return type(default) if type(default) in (bool, int, float, str) else Any
+
+
+def presets_of(cls: type) -> Mapping[str, Mapping[str, Any]]:
+    """A method's named sets of parameters; none where its `presets` are something else."""
+    presets = getattr(cls, "presets", {})
+    return presets if isinstance(presets, Mapping) else {}
 
 
 def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
@@ -135,7 +157,7 @@ def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
     """
     fields = parameters(cls)
     chosen = dict(options)
-    presets: Mapping[str, Mapping[str, Any]] = getattr(cls, "presets", {})
+    presets = presets_of(cls)
     preset = chosen.pop("preset", None) if "preset" not in fields else None
     if preset is not None and preset not in presets:
         raise unknown(f"preset of {name}", str(preset), presets)
@@ -146,20 +168,40 @@ def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
         kind = fields[key][0]
         try:
             values[key] = _converter().structure(value, kind)
-        except (ValueError, KeyError, TypeError, OverflowError):
+        except Exception:  # whatever a converter raises for a value that is not of its type
             raise UserError(f"{name}: {key}={value} is not {describe(kind)}") from None
     missing = [key for key, (_, default) in fields.items() if default is inspect.Parameter.empty and key not in values]
     if missing:
         raise UserError(f"{name}: {', '.join(missing)} must be given, as {name}[{missing[0]}=VALUE]")
     try:
         return cls(**values)
-    except (ValueError, TypeError) as error:
-        raise UserError(f"{name}: {first_line(error)}") from None
+    except Exception as error:
+        raise UserError(f"{name}: {first_line(error)}") from error
 
 
 def values_of(instance: object) -> dict[str, Value]:
-    """Every parameter of a method's instance with its value."""
-    return {key: getattr(instance, key) for key in parameters(type(instance))}
+    """Every parameter of a method's instance with its value.
+
+    Raises
+    ------
+    UserError
+        If an instance does not keep a parameter under its name, or its value is no simple one:
+        it could be neither stored nor told from others.
+    """
+    values: dict[str, Value] = {}
+    for key in parameters(type(instance)):
+        value = getattr(instance, key, _MISSING)
+        if not (value is None or isinstance(value, bool | int | float | str)):
+            kept = "it is not kept" if value is _MISSING else f"it is kept as {type(value).__name__}"
+            raise UserError(
+                f"{type(instance).__name__}: parameter {key!r} must be kept as self.{key}, "
+                f"a truth value, number or text; {kept}"
+            )
+        values[key] = value
+    return values
+
+
+_MISSING = object()
 
 
 def changed(instance: object) -> dict[str, Value]:

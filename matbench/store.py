@@ -38,7 +38,7 @@ class Outcome:
     reason
         Why it is not `ok`, in one line.
     work, history
-        As the estimate gave them.
+        As the estimate gave them; None for a number that is not finite.
     """
 
     status: Status
@@ -48,7 +48,7 @@ class Outcome:
     threads: int | None = None
     reason: str = ""
     work: Mapping[str, int] = {}
-    history: Mapping[str, list[float]] = {}
+    history: Mapping[str, list[float | None]] = {}
 
 
 def write_text(path: Path, text: str) -> None:
@@ -83,28 +83,32 @@ class Store:
             If the folder holds a different plan, or something that is no run.
         """
         store = cls(folder)
+        try:
+            store._claim(plan)
+        except OSError as error:
+            raise UserError(f"output folder {str(folder)!r} cannot be used: {error.strerror}") from error
+        return store
+
+    def _claim(self, plan: Plan) -> None:
+        folder = self.folder
         if folder.exists() and not folder.is_dir():
             raise UserError(f"output {str(folder)!r} is a file: name a folder that is new or holds this run")
         if (folder / "plan.json").exists():
-            if store.request() != plan.request:
+            if self.request() != plan.request:
                 raise UserError(f"output folder {str(folder)!r} holds a different plan: name another folder by --out")
         elif folder.exists() and any(folder.iterdir()):
             raise UserError(
                 f"output folder {str(folder)!r} is not empty and holds no run: name another folder by --out"
             )
-        try:
-            (folder / "cells").mkdir(parents=True, exist_ok=True)
-            write_text(folder / "plan.json", json.dumps({"request": plan.request, **_json.unstructure(plan)}, indent=1))
-        except OSError as error:
-            raise UserError(f"output folder {str(folder)!r} cannot be written: {error.strerror}") from error
-        return store
+        (folder / "cells").mkdir(parents=True, exist_ok=True)
+        write_text(folder / "plan.json", json.dumps({"request": plan.request, **_json.unstructure(plan)}, indent=1))
 
     def _read(self, path: Path) -> dict[str, Any]:
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise UserError(f"{path} cannot be read: {error.strerror}; give a run folder") from error
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise UserError(f"{path} is damaged: not JSON") from error
         if not isinstance(found, dict):
             raise UserError(f"{path} is damaged: not a JSON object")
@@ -131,14 +135,17 @@ class Store:
         return self.folder / "cells" / cell.key
 
     def outcome(self, cell: Cell) -> Outcome | None:
-        """What became of a cell, or None if it has not been computed."""
+        """What became of a cell, or None if it has not been computed, or its files are damaged."""
         path = self.cell(cell) / "cell.json"
         if not path.exists():
             return None
         try:
-            return _json.structure(self._read(path)["outcome"], Outcome)
+            outcome = _json.structure(self._read(path)["outcome"], Outcome)
+            if outcome.status == "ok":
+                self.disparity(cell)
         except Exception:  # half a cell is no cell: it is computed anew
             return None
+        return outcome
 
     @contextmanager
     def building(self, cell: Cell) -> Iterator[Path]:
@@ -186,9 +193,18 @@ class Store:
             shutil.rmtree(draft, ignore_errors=True)
 
     def disparity(self, cell: Cell) -> dict[int, NDArray[np.float32]]:
-        """View index -> (H, W) stored disparity map, pixels per view step."""
+        """View index -> (H, W) stored disparity map, pixels per view step.
+
+        Raises
+        ------
+        ValueError, OSError
+            If the file is missing or holds something else.
+        """
         with np.load(self.cell(cell) / "disparity.npz", allow_pickle=False) as arrays:
-            return {int(name.removeprefix("view_")): arrays[name] for name in arrays.files}
+            maps = {int(name.removeprefix("view_")): arrays[name] for name in arrays.files}
+        if not maps or any(values.ndim != 2 or values.dtype != np.float32 for values in maps.values()):
+            raise ValueError(f"{self.cell(cell) / 'disparity.npz'} holds no disparity maps")
+        return maps
 
 
 def write_cell(
@@ -199,4 +215,5 @@ def write_cell(
         arrays: dict[str, Any] = {f"view_{view}": values for view, values in disparity.items()}
         np.savez_compressed(draft / "disparity.npz", **arrays)
     facts = {"cell": _json.unstructure(cell), "outcome": _json.unstructure(outcome)}
-    (draft / "cell.json").write_text(json.dumps(facts, indent=1), encoding="utf-8")
+    text = json.dumps(facts, indent=1, allow_nan=False)
+    (draft / "cell.json").write_text(text, encoding="utf-8")

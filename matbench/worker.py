@@ -6,6 +6,7 @@ import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +123,10 @@ def _solve(method: Algorithm, scene: Scene, job: Job) -> tuple[Outcome, dict[int
         return Outcome("skipped", reason=str(reason)), None
     context = Context(job.cell.seed, job.threads)
     start = time.perf_counter()
-    method.solve(tiny(scene), context)
+    try:
+        method.solve(tiny(scene), context)
+    except Exception:  # too small for this method, which nobody asked it to solve
+        method.solve(scene, context)
     warmed = time.perf_counter()
     _reset_peak()
     begin = time.perf_counter()
@@ -130,14 +134,16 @@ def _solve(method: Algorithm, scene: Scene, job: Job) -> tuple[Outcome, dict[int
     seconds = time.perf_counter() - begin
     peak = _peak_mb()
     maps = checked(estimate, scene)
-    history = {name: [float(v) for v in values] for name, values in estimate.history.items()}
+    history = {name: [v if isfinite(v) else None for v in map(float, vs)] for name, vs in estimate.history.items()}
     work = {name: int(count) for name, count in estimate.work.items()}
     return Outcome("ok", seconds, warmed - start, peak, job.threads, "", work, history), maps
 
 
-def _record(method: Algorithm, scene: Scene, job: Job, path: Path) -> str:
+def _record(method: Algorithm, job: Job, path: Path) -> str:
     """Solve again, recorded; why there is no recording, if there is none: the answer itself stands."""
     from matbench.recording import record
+
+    scene = load_scene(job.cell.scene, job.data)
 
     def solve(probe: Any) -> Estimate:
         return method.solve(hide_truth(scene), Context(job.cell.seed, job.threads, probe))
@@ -162,13 +168,13 @@ def run_cell(job: Job) -> None:
         try:
             plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
             method = spec.build(plugin.name, plugin.load(), cell.method.params)
-            scene = load_scene(cell.scene, job.data)
+            scene = hide_truth(load_scene(cell.scene, job.data))
             if scene.digest != cell.scene_digest:
                 raise UserError(f"{cell.scene} is not what it was when the run was planned")
-            outcome, maps = _solve(method, hide_truth(scene), job)
+            outcome, maps = _solve(method, scene, job)
             if job.record and outcome.status == "ok":
-                outcome = evolve(outcome, reason=_record(method, scene, job, draft / "recording.rrd"))
-        except Exception as error:
+                outcome = evolve(outcome, reason=_record(method, job, draft / "recording.rrd"))
+        except (Exception, SystemExit, KeyboardInterrupt) as error:  # Ctrl-C never comes to this process
             traceback.print_exc()
             outcome, maps = Outcome("failed", reason=f"{type(error).__name__}: {first_line(error)}"), None
         write_cell(draft, cell, outcome, maps)

@@ -37,6 +37,8 @@ class Report:
         Name -> scene. A scene that is not among them has no pictures.
     facts
         What it ran on, as shown: ``{"numpy": "2.4.1", "processor": ...}``.
+    ablation
+        What each factor does (`matbench.ablation.COLUMNS`), if that was asked for.
     higher
         Metrics of which more is better; of all others, less is.
     """
@@ -48,6 +50,7 @@ class Report:
     maps: Maps = field(factory=dict)
     scenes: Mapping[str, Scene] = field(factory=dict)
     facts: Mapping[str, str] = field(factory=dict)
+    ablation: pd.DataFrame | None = None
     higher: frozenset[str] = frozenset()
 
     def disparity(self, algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:

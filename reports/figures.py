@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SIDE = 512  # px; larger pictures are made smaller
 LEVELS = 128  # steps of a colour scale: no eye sees them, and files are a quarter smaller
-_INK = "#01fe02"  # stands for the page's text colour until the SVG is written
+INK = "#01fe02"  # stands for the page's text colour until the SVG is written
 
 
 def _smaller(picture: NDArray[np.uint8], exact: bool) -> NDArray[np.uint8]:
@@ -64,14 +64,14 @@ def _place_labels(figure: "Figure", axes: "Axes", points: Sequence[tuple[float, 
         left_half = spot[0] < axes.bbox.x0 + axes.bbox.width * 0.55
         sides = ((9, "left"), (-9, "right")) if left_half else ((-9, "right"), (9, "left"))
         choices = [(dx, dy, ha) for dy in (0, 13, -13, 26, -26, 39, -39) for dx, ha in sides]
-        leader = {"arrowstyle": "-", "color": _INK, "lw": 0.6, "alpha": 0.6, "shrinkA": 0, "shrinkB": 4}
+        leader = {"arrowstyle": "-", "color": INK, "lw": 0.6, "alpha": 0.6, "shrinkA": 0, "shrinkB": 4}
         text = axes.annotate(
             name,
             (x, y),
             (0, 0),
             textcoords="offset points",
             va="center",
-            color=_INK,
+            color=INK,
             parse_math=False,
             arrowprops=leader,
         )
@@ -120,10 +120,8 @@ def cost(rows: pd.DataFrame, score: str, unit: str) -> "Figure | None":
     figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     axes = figure.subplots()
     along = front(points)
-    axes.step([p[0] for p in along], [p[1] for p in along], where="post", color=_INK, lw=1, ls=(0, (3, 3)), alpha=0.6)
-    axes.scatter(
-        [p[0] for p in points], [p[1] for p in points], s=52, color="#3b78c3", edgecolor=_INK, lw=0.8, zorder=3
-    )
+    axes.step([p[0] for p in along], [p[1] for p in along], where="post", color=INK, lw=1, ls=(0, (3, 3)), alpha=0.6)
+    axes.scatter([p[0] for p in points], [p[1] for p in points], s=52, color="#3b78c3", edgecolor=INK, lw=0.8, zorder=3)
     axes.set_xscale("log")
     xs = [p[0] for p in points]
     axes.set_xlim(min(xs) / 1.8, max(xs) * 1.8)
@@ -131,12 +129,12 @@ def cost(rows: pd.DataFrame, score: str, unit: str) -> "Figure | None":
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     minor = FuncFormatter(lambda value, _: f"{value:g}") if max(xs) < 10 * min(xs) else NullFormatter()
     axes.xaxis.set_minor_formatter(minor)
-    axes.set_xlabel("seconds per scene (logarithmic)", color=_INK)
-    axes.set_ylabel(f"{score}, {unit}", color=_INK)
-    axes.tick_params(which="both", colors=_INK)
-    axes.grid(True, alpha=0.25, lw=0.6, color=_INK)
+    axes.set_xlabel("seconds per scene (logarithmic)", color=INK)
+    axes.set_ylabel(f"{score}, {unit}", color=INK)
+    axes.tick_params(which="both", colors=INK)
+    axes.grid(True, alpha=0.25, lw=0.6, color=INK)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(_INK)
+    axes.spines[["left", "bottom"]].set_color(INK)
     _place_labels(figure, axes, points)
     return figure
 
@@ -150,7 +148,7 @@ def svg(figure: "Figure") -> str:
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "matbench"}):
         figure.savefig(out, format="svg", transparent=True, metadata=metadata)
     text = out.getvalue()
-    text = text[text.index("<svg") :].replace(_INK, "currentColor")
+    text = text[text.index("<svg") :].replace(INK, "currentColor")
     for unwanted in (
         r"<metadata>.*?</metadata>",
         r"<style.*?</style>",

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -15,13 +15,16 @@ from attrs import evolve
 from markupsafe import Markup, escape
 
 from matbench import coloring
-from matbench.reports import figures, tables
+from matbench.reports import figures, switches, tables
 from matbench.reports.content import Report
-from matbench.reports.tables import FEW, METRIC, REGION, Shared
+from matbench.reports.tables import METRIC, REGION, Shared
 from matbench.scene import Scene
+from matbench.statistics import FEW
 from matbench.store import write_text
 
 __all__ = ["Report", "render", "write"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CAPTIONED = ("nonocc", "all", "occ")
 
@@ -68,6 +71,8 @@ def render(report: Report) -> str:
         error_limit=coloring.WORST,
         bad=_records(report.cells[report.cells["status"] != "ok"], ("method", "scene", "seed", "status", "reason")),
         methods=_methods(report.cells),
+        switches=[] if report.ablation is None else switches.lines(report.ablation).values.tolist(),
+        forest=None if report.ablation is None else _svg(switches.forest(report.ablation)),
     )
 
 
@@ -160,7 +165,10 @@ def _data(report: Report, scope: Shared) -> dict[str, Any]:
 
 
 def _figure(rows: pd.DataFrame) -> str | None:
-    figure = figures.cost(rows, f"{METRIC} {REGION}", "%")
+    return _svg(figures.cost(rows, f"{METRIC} {REGION}", "%"))
+
+
+def _svg(figure: "Figure | None") -> str | None:
     return None if figure is None else figures.svg(figure)
 
 

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
 
 METRIC, REGION = "total_bad_1", "all"
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
-FEW = 6  # fewer shared scenes than this carry no conclusion
 
 _NO_SCENES: frozenset[str] = frozenset()
 
@@ -128,7 +127,7 @@ def seconds(cells: pd.DataFrame, scope: Shared) -> pd.Series:
     return pd.Series({m: wide.loc[list(scope.counted(m)), m].mean(skipna=False) for m in scope.methods}, dtype=float)
 
 
-def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
+def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False) -> pd.DataFrame:
     """Methods x means, best first by `metric` in `all`.
 
     Parameters
@@ -137,6 +136,8 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC) ->
         The two tables of a run.
     metric
         What is shown for every region.
+    higher
+        Is more of it better?
 
     Returns
     -------
@@ -153,7 +154,8 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC) ->
     out["scenes"] = [len(scope.counted(m)) for m in scope.methods]
     out["asked"] = len(scope.asked)
     out["ranked"] = pd.Series([scope.is_ranked(m) for m in scope.methods], out.index, dtype=bool)
-    order = out.assign(unranked=~out["ranked"]).sort_values(["unranked", f"{metric} {REGION}"], kind="stable")
+    by = ["unranked", f"{metric} {REGION}"]
+    order = out.assign(unranked=~out["ranked"]).sort_values(by, ascending=[True, not higher], kind="stable")
     return out.loc[order.index]
 
 
@@ -185,8 +187,10 @@ def places(values: pd.Series, unit: str, higher: bool = False) -> pd.Series:
     return pd.Series([b + 1 if b < 2 else 0 for b in better], values.index)
 
 
-def terminal(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC) -> "list[Table]":
+def terminal(
+    results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False, width: int = 80
+) -> "list[Table]":
     """The summary, the scenes one by one and what went wrong, for a terminal of 80 columns or more."""
     from matbench.reports.terminal import tables
 
-    return tables(results, cells, metric)
+    return tables(results, cells, metric, higher, width)

@@ -6,7 +6,6 @@ from rich.table import Table
 from rich.text import Text
 
 from matbench.reports.tables import (
-    FEW,
     METRIC,
     REGION,
     REGIONS,
@@ -19,19 +18,26 @@ from matbench.reports.tables import (
     summary,
 )
 from matbench.reports.tables import text as shown
+from matbench.statistics import FEW
 
 WIDTH = 80
+NARROW = ("disc", "textureless")
 _PADDING = 2
 
 
-def tables(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC) -> list[Table]:
-    """The summary, the scenes one by one and what went wrong; empty tables are left out."""
+def tables(
+    results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False, width: int = WIDTH
+) -> list[Table]:
+    """The summary, the scenes one by one and what went wrong; empty tables are left out.
+
+    Where there are fewer than `WIDTH` columns, the summary leaves out `NARROW`.
+    """
     scope = shared(results, cells)
     out = []
     if scope.methods:
-        out.append(_summary(results, cells, scope, metric))
+        out.append(_summary(results, cells, scope, metric, higher, width))
     if len(results):
-        out += _scenes(results, cells, scope, metric)
+        out += _scenes(results, cells, scope, metric, higher, width)
     bad = labelled(cells)
     bad = bad[bad["status"] != "ok"]
     if len(bad):
@@ -47,8 +53,8 @@ def _number(value: float, unit: str, place: int) -> Text:
     return Text(shown(value, unit), style="bold" if place == 1 else "")
 
 
-def _summary(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str) -> Table:
-    rows, unit = summary(results, cells, metric), metrics(results).get(metric, "%")
+def _summary(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str, higher: bool, width: int) -> Table:
+    rows, unit = summary(results, cells, metric, higher), metrics(results).get(metric, "%")
     count = f"{len(scope.scenes)} of {len(scope.asked)} scenes"
     hint = "; too few scenes to conclude" if len(scope.scenes) < FEW else ""
     table = _plain(f"{metric} ({unit}) by region, mean over {count}{hint}")
@@ -56,9 +62,11 @@ def _summary(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: 
     table.add_column("method", overflow="fold", min_width=12)
     heads = {f"{metric} {r}": (r.replace("textureless", "texture-\nless") + f"\n{unit}", unit) for r in REGIONS}
     heads |= {"avg all": ("avg\nall\npx", "px"), "seconds": ("time\ns", "s")}
+    if width < WIDTH:
+        heads = {column: head for column, head in heads.items() if column.split()[-1] not in NARROW}
     for head, _ in heads.values():
         table.add_column(Text(head), justify="right", no_wrap=True, vertical="top")
-    marks = {c: places(rows.loc[rows["ranked"], c], u) for c, (_, u) in heads.items()}
+    marks = {c: places(rows.loc[rows["ranked"], c], u, higher and metric in c) for c, (_, u) in heads.items()}
     for number, (method, row) in enumerate(rows.iterrows(), 1):
         name = Text(str(method))
         if not row["ranked"]:
@@ -75,15 +83,18 @@ def _headings(methods: list[str], numbers: dict[str, int], room: int) -> list[st
     return names if fits else [f"#{numbers[m]}" for m in methods]
 
 
-def _scenes(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str) -> list[Table]:
-    """Scenes x methods, in as many tables as it takes to stay within `WIDTH`."""
-    methods = [str(m) for m in summary(results, cells, metric).index]
+def _scenes(
+    results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str, higher: bool, width: int
+) -> list[Table]:
+    """Scenes x methods, in as many tables as it takes to stay within the width."""
+    room = min(width, WIDTH)
+    methods = [str(m) for m in summary(results, cells, metric, higher).index]
     unit = metrics(results).get(metric, "%")
     numbers = {m: i for i, m in enumerate(methods, 1)}
     values = per_scene(results, REGION, metric).reindex(index=list(scope.asked), columns=methods)
     first = min(max((len(s) for s in scope.asked), default=0), 28)
-    heads = _headings(methods, numbers, WIDTH - first)
-    at_once = len(methods) if not heads[0].startswith("#") else max(1, (WIDTH - first) // (7 + _PADDING))
+    heads = _headings(methods, numbers, room - first)
+    at_once = len(methods) if not heads[0].startswith("#") else max(1, (room - first) // (7 + _PADDING))
     bad = labelled(cells)
     bad = bad[bad["status"] != "ok"]
     status = {(m, s): state for m, s, state in zip(bad["method"], bad["scene"], bad["status"], strict=True)}
@@ -95,7 +106,7 @@ def _scenes(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: s
         for head in heads[start : start + at_once]:
             table.add_column(Text(head), justify="right", overflow="fold")
         for scene, row in values.iterrows():
-            marks = places(row[[m for m in methods if scene in scope.has[m]]], unit)
+            marks = places(row[[m for m in methods if scene in scope.has[m]]], unit, higher)
             shown_row = [
                 Text(status[m, str(scene)], style="italic")
                 if (m, scene) in status

@@ -5,6 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from matbench.plugins import kernel_cache
+
+# numba does not notice changes of what a kernel calls in another file: each state of the code has its own cache
+os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))
+
 
 @pytest.fixture(scope="session")
 def data_root() -> Path:

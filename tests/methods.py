@@ -53,6 +53,32 @@ class Exits:
         os._exit(7)
 
 
+class Leaves:
+    """Asks Python to end."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        raise SystemExit(0)
+
+
+class NeedsRoom:
+    """Cannot be compiled on a corner of the scene."""
+
+    def __init__(self, share=0.5):  # type: ignore[no-untyped-def]
+        self.share = share
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        if scene.width < 65:
+            raise ValueError("too narrow")
+        return _flat(scene, self.share)
+
+
+class _Help:
+    """Not for the public."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        raise AssertionError("must not be offered")
+
+
 class Raises:
     """Fails, having said something."""
 

@@ -1,6 +1,7 @@
 """The command line as a person types it: help, lists, and everything one can get wrong."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -37,8 +38,9 @@ def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str
         (["-m", "bad_3"], "unknown metric 'bad_3'"),
         (["--data", "/no/such/folder"], "data folder '/no/such/folder' (--data) does not exist"),
         (["--plugin", "/no/such.py"], "plug-in file '/no/such.py' does not exist"),
-        (["--seed", "-1"], "seed"),
-        (["--seed", "x"], "Invalid value"),
+        (["--seed=-1"], "seed '-1' is not a whole number"),
+        (["--seed", "x"], "seed 'x' is not a whole number"),
+        (["--seed", "1.5"], "seed '1.5' is not a whole number"),
         (["--bogus"], "Unknown option"),
     ],
 )
@@ -117,21 +119,62 @@ def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(word in out for word in ("materiality", "preset=paper", "middlebury2003/teddy", "total_bad_1"))
 
 
-def test_a_broken_plugin_is_listed_with_its_error_and_harms_nothing(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from importlib.metadata import EntryPoint
+PLUGINS = """\
+[matbench.algorithms]
+leaves = broken_package.leaves:X
+number = broken_package.odd:number
+hint = broken_package.odd:Hint
+[matbench.datasets]
+odd = broken_package.odd:number
+[matbench.metrics]
+missing = broken_package.odd:missing
+odd = broken_package.odd:number
+failing = broken_package.odd:failing
+"""
+ODD = """\
+from matbench.metrics import Metric
+number = 3
+failing = Metric("failing", "px", "lower", "always fails", lambda errors: 1 / 0)
+class Hint:
+    def __init__(self, x: "nowhere.to.be.found" = 3): pass
+    def solve(self, scene, context): pass
+"""
 
-    from matbench import plugins
 
-    broken = plugins.Plugin("broken", "some-package", EntryPoint("broken", "no_such_module:X", "matbench.algorithms"))
-    real = plugins.installed("algorithms")
-    monkeypatch.setattr(plugins, "installed", lambda group: {**real, "broken": broken} if group == "algorithms" else {})
-    found = plugins.algorithms()
-    from matbench.listing import _algorithm
+def test_broken_plugins_are_listed_with_their_errors_and_harm_nothing(tmp_path: Path) -> None:
+    package = tmp_path / "site" / "broken_package"
+    facts = tmp_path / "site" / "broken_package-1.0.dist-info"
+    package.mkdir(parents=True)
+    facts.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "leaves.py").write_text("import sys\nsys.exit(3)\n")
+    (package / "odd.py").write_text(ODD)
+    (facts / "METADATA").write_text("Metadata-Version: 2.1\nName: broken-package\nVersion: 1.0\n")
+    (facts / "entry_points.txt").write_text(PLUGINS)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
 
-    assert "no_such_module" in _algorithm(found["broken"])["error"]
-    assert "parameters" in _algorithm(found["sgbm"])
+    def matbench(*tokens: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "matbench", *tokens]
+        return subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
+
+    listed = matbench("list", "--json")
+    assert listed.returncode == 0, listed.stderr
+    known = json.loads(listed.stdout)
+    assert "SystemExit: 3" in known["algorithms"]["leaves"]["error"]
+    assert "no class" in known["algorithms"]["number"]["error"]
+    assert "nowhere" in known["algorithms"]["hint"]["error"]
+    assert "AttributeError" in known["scenes"]["odd"]["error"]
+    assert "missing" in known["metrics"]["missing"]["error"]
+    assert matbench("list").returncode == 0
+    done = matbench("compare", "-a", "sgbm", "-s", SMALL, "--out", "run")
+    assert done.returncode == 0, done.stderr
+    assert "failing" in (tmp_path / "run" / "results.csv").read_text()
+
+
+def test_who_stops_reading_is_no_error(tmp_path: Path) -> None:
+    line = f"{sys.executable} -m matbench list | head -1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", line], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_help_is_quick_and_imports_nothing_heavy() -> None:

@@ -47,11 +47,12 @@ def test_results_are_tidy_and_exact(tmp_path: Path) -> None:
 
 
 def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
-    bad = ["exits", "raises", "writes", "misshapen", "bare", "peeks", "declines"]
+    bad = ["exits", "leaves", "raises", "writes", "misshapen", "bare", "peeks", "declines"]
     results = compare(tmp_path, *bad, "flat")
     found = cells(tmp_path)
     assert found.status.to_dict() == {
         "exits": "crashed",
+        "leaves": "failed",
         "raises": "failed",
         "writes": "failed",
         "misshapen": "failed",
@@ -138,6 +139,42 @@ def test_half_a_cell_is_no_cell(tmp_path: Path) -> None:
     compare(tmp_path, "flat")
     assert (run / "results.csv").read_bytes() == scores
     assert cells(tmp_path).status["flat"] == "ok"
+
+
+@pytest.mark.parametrize("damage", ["missing", "junk", "pickled", "shape"])
+def test_damaged_maps_are_computed_anew(tmp_path: Path, damage: str) -> None:
+    compare(tmp_path, "flat")
+    run = tmp_path / "run"
+    scores = (run / "results.csv").read_bytes()
+    maps = run / "cells" / cells(tmp_path).cell["flat"] / "disparity.npz"
+    if damage == "missing":
+        maps.unlink()
+    elif damage == "junk":
+        maps.write_bytes(b"nothing like a map")
+    elif damage == "pickled":
+        np.savez(maps, view_2=np.array([{"a": 1}], object))
+    else:
+        np.savez(maps, view_2=np.zeros(3, np.float32))
+    compare(tmp_path, "flat")
+    assert (run / "results.csv").read_bytes() == scores
+
+
+def test_a_method_too_large_for_the_warm_up_still_competes(tmp_path: Path) -> None:
+    results = compare(tmp_path, "needs_room")
+    assert cells(tmp_path).status["needs_room"] == "ok"
+    assert len(results)
+
+
+def test_one_scene_in_two_spellings_counts_once(tmp_path: Path) -> None:
+    names = ["synthetic/box[size=96x72]", "synthetic/box[seed=0 size=96x72]", "synthetic/box[size=96x72 views=0:5]"]
+    results = matbench.compare("flat", names, out=tmp_path / "run", plugin=METHODS)
+    assert results.scene.unique().tolist() == names[:1]
+
+
+@pytest.mark.parametrize("seed", [1.5, "12", None, [], [1, -1], True])
+def test_seeds_are_whole_numbers(tmp_path: Path, seed: object) -> None:
+    with pytest.raises(UserError, match="whole numbers"):
+        compare(tmp_path, "flat", seed=seed)
 
 
 def test_interrupted_by_the_user_and_taken_up_again(tmp_path: Path) -> None:
@@ -231,3 +268,37 @@ def test_recordings_are_written_on_request_and_found_by_name(tmp_path: Path) -> 
     before = found.stat().st_mtime_ns
     compare(tmp_path, "flat", "noise", record=True)
     assert found.stat().st_mtime_ns == before
+
+
+def test_an_ablation_from_the_command_line(tmp_path: Path) -> None:
+    request = tmp_path / "level.toml"
+    request.write_text(f'algorithms = ["flat[value=1,2,3]"]\nscenes = ["{SMALL}"]\n')
+    line = [sys.executable, "-m", "matbench", "ablate", str(request), "--plugin", str(METHODS), "--out", "run"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "too few scenes" in done.stdout
+    table = pd.read_csv(tmp_path / "run" / "ablation.csv").set_index(["level", "region", "metric"])
+    scores = (
+        pd.read_csv(tmp_path / "run" / "results.csv", keep_default_na=False, na_values={"value": [""]})
+        .set_index(["params", "region", "metric"])
+        .value
+    )
+    change = scores["value=3.0", "all", "avg"] - scores["", "all", "avg"]
+    assert table.loc[(3.0, "all", "avg"), "change"] == pytest.approx(change)
+    assert "What each switch does" in (tmp_path / "run" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("algorithms = 3", "algorithms is 3, not a list of texts"),
+        ("algorithms = ['flat'", "is not TOML"),
+        ("scenes = ['synthetic/box']", "names no algorithms"),
+        ("algorithm = ['flat']", "did you mean 'algorithms'?"),
+    ],
+)
+def test_a_malformed_request_is_refused(tmp_path: Path, content: str, said: str) -> None:
+    (tmp_path / "request.toml").write_text(content)
+    with pytest.raises(UserError, match=r"request\.toml") as error:
+        comparison.read_request(tmp_path / "request.toml")
+    assert said in str(error.value)

@@ -127,3 +127,36 @@ def test_a_parameter_without_default_must_be_given() -> None:
 
     with pytest.raises(UserError, match="window must be given"):
         build("plain", Plain, {})
+
+
+def test_parameters_without_annotation_have_the_type_of_their_default() -> None:
+    class Plain:
+        def __init__(self, share=0.5, name=None):  # type: ignore[no-untyped-def]
+            self.share, self.name = share, name
+
+    assert build("plain", Plain, {"share": "2"}).share == 2.0
+    assert build("plain", Plain, values_of(Plain())).name is None
+
+
+@pytest.mark.parametrize("value", [object(), [1], {}])
+def test_a_parameter_must_be_kept_as_a_simple_value(value: object) -> None:
+    class Plain:
+        def __init__(self, share: float = 0.5) -> None:
+            self.share = value
+
+    class Forgets:
+        def __init__(self, share: float = 0.5) -> None:
+            pass
+
+    for cls in (Plain, Forgets):
+        with pytest.raises(UserError, match=r"must be kept as self\.share"):
+            values_of(cls())
+
+
+def test_an_annotation_that_names_nothing_is_said() -> None:
+    class Odd:
+        def __init__(self, share: "nowhere" = 0.5) -> None:  # type: ignore[name-defined]  # noqa: F821
+            pass
+
+    with pytest.raises(UserError, match="cannot be read"):
+        parameters(Odd)

@@ -1,0 +1,96 @@
+"""What each switch of a method does: paired differences, factor by factor."""
+
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+from attrs import asdict
+
+from matbench.errors import UserError
+from matbench.plan import Method, Plan
+from matbench.spec import Value, text
+from matbench.statistics import paired_effect
+
+COLUMNS = (
+    "algorithm",
+    "factor",
+    "base",
+    "level",
+    "region",
+    "metric",
+    "unit",
+    "change",
+    "low",
+    "high",
+    "effect_size",
+    "scenes",
+    "verdict",
+)
+
+
+def factors(methods: Sequence[Method]) -> dict[str, dict[str, list[Value]]]:
+    """Algorithm -> parameter -> its values, for each parameter that varies; the first value is the base.
+
+    Raises
+    ------
+    UserError
+        If no parameter of any method takes two values: there is nothing to compare.
+    """
+    found: dict[str, dict[str, list[Value]]] = {}
+    for method in methods:
+        levels = found.setdefault(method.algorithm, {})
+        for name, value in method.params.items():
+            known = levels.setdefault(name, [])
+            if value not in known:
+                known.append(value)
+    varied = {
+        algorithm: {name: values for name, values in levels.items() if len(values) > 1}
+        for algorithm, levels in found.items()
+    }
+    if not any(varied.values()):
+        raise UserError("nothing varies: give a parameter several values, as in 'materiality[pairs=all,consecutive]'")
+    return varied
+
+
+def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
+    """The change of every metric and region when one factor goes from its base to another level.
+
+    All else is equal within a difference: the other parameters, scene, seed, region. Differences
+    are averaged within a scene, over seeds and the other factors' levels; effects are over scenes.
+
+    Parameters
+    ----------
+    results
+        ``results.csv`` of the plan.
+
+    Returns
+    -------
+    Columns `COLUMNS`: `change` is the mean of level minus base in `unit`, `low` and `high` its
+    interval, and so on as in `matbench.statistics.Effect`.
+    """
+    methods = list({str(cell.method): cell.method for cell in plan.cells}.values())
+    by_label = {(method.algorithm, method.changed): method for method in methods}
+    rows = []
+    for algorithm, levels in factors(methods).items():
+        mine = results[results["algorithm"] == algorithm]
+        for factor, values in levels.items():
+            wide = _levels_side_by_side(mine, by_label, factor)
+            for level in values[1:]:
+                base, other = text({factor: values[0]}), text({factor: level})
+                if base not in wide or other not in wide:
+                    continue
+                change = (wide[other] - wide[base]).groupby(["region", "metric", "unit", "scene"], sort=False).mean()
+                for (region, metric, unit), over_scenes in change.groupby(["region", "metric", "unit"], sort=False):
+                    effect = paired_effect(over_scenes.to_list())
+                    numbers = asdict(effect)
+                    head = (algorithm, factor, base.partition("=")[2], other.partition("=")[2], region, metric, unit)
+                    rows.append((*head, *numbers.values(), effect.verdict))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _levels_side_by_side(results: pd.DataFrame, methods: Mapping[tuple[str, str], Method], factor: str) -> pd.DataFrame:
+    """One column for each level of the factor; the index names all that is equal within a row."""
+    labels = list(zip(results["algorithm"], results["params"], strict=True))
+    level = [text({factor: methods[label].params[factor]}) for label in labels]
+    rest = [text({k: v for k, v in methods[label].params.items() if k != factor}) for label in labels]
+    keys = ["rest", "scene", "seed", "region", "metric", "unit"]
+    return results.assign(level=level, rest=rest).set_index([*keys, "level"])["value"].unstack("level")

@@ -1,0 +1,89 @@
+"""What each switch of a method does, in a terminal, on the page and in LaTeX."""
+
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from matbench.reports.figures import INK
+from matbench.reports.tables import METRIC, REGIONS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def lines(ablation: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
+    """One row for each algorithm, factor, level and region: what is shown, as texts.
+
+    Columns: switch, region, change, interval, size, scenes, verdict; changes in the metric's unit.
+    """
+    shown = ablation[(ablation["metric"] == metric) & ablation["region"].isin(REGIONS)]
+    several = ablation["algorithm"].nunique() > 1
+    rows = [
+        {
+            "switch": f"{row['algorithm'] + ': ' if several else ''}{row['factor']} {row['base']} → {row['level']}",
+            "region": row["region"],
+            "change": f"{row['change']:+.2f}",
+            "interval": f"{row['low']:+.2f} .. {row['high']:+.2f}" if row["low"] == row["low"] else "–",
+            "size": f"{row['effect_size']:+.1f}" if row["effect_size"] == row["effect_size"] else "–",
+            "scenes": str(row["scenes"]),
+            "verdict": row["verdict"],
+        }
+        for row in shown.to_dict("records")
+    ]
+    return pd.DataFrame(rows, columns=["switch", "region", "change", "interval", "size", "scenes", "verdict"])
+
+
+def terminal(ablation: pd.DataFrame, metric: str = METRIC) -> Table:
+    """The mean changes of one metric with their intervals over scenes, a block of regions for each switch."""
+    units = ablation.loc[ablation["metric"] == metric, "unit"]
+    unit = f" ({units.iloc[0]})" if len(units) else ""
+    title = Text(f"What each switch does to {metric}{unit}")
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("switch", overflow="fold", min_width=12)
+    for head in ("region", "change", "interval", "size", "scenes", "verdict"):
+        table.add_column(head, justify="left" if head in ("region", "verdict") else "right", no_wrap=True)
+    last = None
+    for switch, *values in lines(ablation, metric).to_numpy().tolist():
+        if last not in (None, switch):
+            table.add_section()
+        table.add_row(Text(switch if switch != last else ""), *(Text(value) for value in values))
+        last = switch
+    return table
+
+
+def latex(ablation: pd.DataFrame, metric: str = METRIC) -> str:
+    """The same numbers as a LaTeX table (package booktabs)."""
+    table = lines(ablation, metric).drop(columns="size").replace({"→": r"$\\to$", "–": "--"}, regex=True)
+    table["switch"] = table["switch"].str.replace("_", r"\_", regex=False)
+    body = table.style.hide(axis="index").to_latex(hrules=True, column_format="llrrrl")
+    return f"% {metric}: mean change, 95 % bootstrap interval over scenes\n{body}"
+
+
+def forest(ablation: pd.DataFrame, metric: str = METRIC) -> "Figure | None":
+    """A forest plot: a line for each switch and region, its mean change and interval; None without any."""
+    shown = ablation[(ablation["metric"] == metric) & ablation["region"].isin(["nonocc", "all", "occ"])]
+    if not len(shown):
+        return None
+    from matplotlib.figure import Figure
+
+    rows: list[Any] = shown.to_dict("records")
+    figure = Figure(figsize=(7.2, 0.9 + 0.26 * len(shown)), layout="constrained")
+    axes = figure.subplots()
+    places = range(len(shown))[::-1]
+    for place, row in zip(places, rows, strict=True):
+        if row["low"] == row["low"]:
+            ends = [row["low"], row["high"]]
+            axes.plot(ends, [place, place], color="#3b78c3", lw=2, solid_capstyle="butt")
+        axes.plot([row["change"]], [place], marker="o", ms=6, color="#3b78c3", mec=INK, mew=0.8, ls="")
+    axes.axvline(0, color=INK, lw=0.8, ls=(0, (3, 3)), alpha=0.6)
+    names = [f"{row['factor']} {row['base']} → {row['level']}, {row['region']}" for row in rows]
+    axes.set_yticks(list(places), names, color=INK, parse_math=False)
+    axes.set_xlabel(f"change of {metric}, {shown['unit'].iloc[0]}: left of the line is lower", color=INK)
+    axes.tick_params(colors=INK)
+    axes.grid(True, axis="x", alpha=0.25, lw=0.6, color=INK)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.spines["bottom"].set_color(INK)
+    return figure
