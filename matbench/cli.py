@@ -132,7 +132,7 @@ def ablate(
 
     `matbench ablate 'materiality[pairs=all,consecutive binarization=plane,volume]' -s 'middlebury*/*' --data DATA`
 
-    `matbench ablate ablations/pairs.toml --data DATA`
+    `matbench ablate algorithms/ablations/pairs.toml --data DATA`
     """
     from matbench import ablation, comparison
     from matbench.plan import methods

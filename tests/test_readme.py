@@ -39,7 +39,19 @@ def test_the_python_code_runs(tmp_path: Path) -> None:
     assert (tmp_path / "runs/two-methods/report.html").exists()
 
 
-@pytest.mark.parametrize("line", [line for line in LINES if "--data" in line])
+@pytest.mark.parametrize("line", [line for line in LINES if " ablate " in line])
+def test_the_ablations_vary_something(line: str) -> None:
+    from matbench import ablation, comparison, plan
+
+    selector = shlex.split(line)[2]
+    chosen = [selector]
+    if selector.endswith(".toml"):
+        chosen, scenes = comparison.read_request(README.parent / selector)
+        assert scenes
+    assert any(ablation.factors(plan.methods(chosen)).values())
+
+
+@pytest.mark.parametrize("line", [line for line in LINES if "--data" in line and " ablate " not in line])
 def test_the_lines_on_real_scenes_are_understood(line: str, data_root: Path, tmp_path: Path) -> None:
     from matbench import comparison
 
