@@ -4,13 +4,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from attrs import field, frozen, validators
-from numba import njit
 from numpy.typing import NDArray
 
-FLAGS = {"contract", "reassoc", "nsz"}
+from matbench.algorithms.kernels import helper, kernel
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _least(values):  # type: ignore[no-untyped-def]
     """The least of some numbers, none NaN; four chains, as each step waits for the one before."""
     a = b = c = d = values[0]
@@ -23,7 +22,7 @@ def _least(values):  # type: ignore[no-untyped-def]
     return min(min(a, b), min(c, d))
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _extend(cost, below, before, above, floor, small, large, path, total):  # type: ignore[no-untyped-def]
     """L(p, k) = C(p, k) + min(L(q, k), L(q, k +- 1) + P1, min L(q) + P2) - min L(q), added to the total.
 
@@ -38,7 +37,7 @@ def _extend(cost, below, before, above, floor, small, large, path, total):  # ty
         total[k] += path[k]
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _contrast(a, b):  # type: ignore[no-untyped-def]
     """Largest difference of two pixels over their colours, in grey levels."""
     return max(
@@ -46,7 +45,7 @@ def _contrast(a, b):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def _sweep(cost, image, small, large, forward, total):  # type: ignore[no-untyped-def]
     """Four of the eight paths: from the previous pixel of the row and the three in the previous row.
 
@@ -132,7 +131,7 @@ def aggregate(
     return total
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def winner(total, cost, fit):  # type: ignore[no-untyped-def]
     """(H, W) float32 plane index of the least total, to a fraction of a plane by the equiangular fit.
 
@@ -173,8 +172,8 @@ class SemiGlobal:
         Grey levels (largest over the colours) over which P2 falls to 1/e; never below P1.
     """
 
-    small_step: float = field(default=0.5, validator=validators.ge(0))
-    large_step: float = field(default=3.0, validator=validators.ge(0))
+    small_step: float = field(default=0.2, validator=validators.ge(0))
+    large_step: float = field(default=1.0, validator=validators.ge(0))
     contrast: float = field(default=25.0, validator=validators.gt(0))
 
     def read(
@@ -199,7 +198,10 @@ class SemiGlobal:
         -------
         (H, W) float32, NaN where all costs are.
         """
-        weights = (self.small_step, self.large_step, self.contrast, threads)
-        fit = aggregate(cost, image, *weights)
-        total = fit if extra is None else aggregate(cost + extra, image, *weights)
+        fit = self.sums(cost, image, threads)
+        total = fit if extra is None else self.sums(cost + extra, image, threads)
         return np.asarray(winner(total, cost, fit))
+
+    def sums(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
+        """(H, W, K) path costs, summed over the eight directions; see `aggregate`."""
+        return aggregate(cost, image, self.small_step, self.large_step, self.contrast, threads)

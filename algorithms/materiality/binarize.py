@@ -1,18 +1,18 @@
 """From a fuzzy map of materialities to the disparities of the reference view."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from matbench.algorithms.kernels import kernel
 from matbench.algorithms.materiality.energy import see_row
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.similarity import FULL
 from matbench.space import DisparitySpace
 
-PRIOR = 0.1  # weight of the cost of being hidden, against 1 for a pair that sees the point
+PRIOR = 0.25  # weight of the cost of being hidden, against 1 for a pair that sees the point
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _seen_rays(mu, view, first, origin, fineness, top, end, seen):  # type: ignore[no-untyped-def]
     one = np.float32(1)
     planes, width = seen.shape[2], seen.shape[1]
@@ -72,7 +72,7 @@ def by_plane(mu: NDArray[np.float32], space: DisparitySpace, view: int, target: 
     return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _visible_cost(mu, rho, pairs, views, view, first, origin, fineness, hidden, prior, top, end, cost, material):  # type: ignore[no-untyped-def]
     _, width, planes = cost.shape
     samples = (width - 1) * fineness + 1

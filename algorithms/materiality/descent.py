@@ -5,21 +5,20 @@ from math import sqrt
 
 import numpy as np
 from attrs import frozen
-from numba import njit
 from numpy.typing import NDArray
 
+from matbench.algorithms.kernels import helper, kernel
 from matbench.algorithms.materiality.energy import data_row, see_row, smooth_row, total_row
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.similarity import FULL
 from matbench.space import DisparitySpace
 
-FLAGS = {"contract", "reassoc", "nsz"}
 RISE = 1e-6  # but at a restart, the energy exceeds that of the pass before by at most this share
 
 Floats = NDArray[np.floating]
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _extrapolate(now, before, beta, one, out):  # type: ignore[no-untyped-def]
     """out = now + beta (now - before), kept within [0, 1]."""
     zero = one - one
@@ -29,7 +28,7 @@ def _extrapolate(now, before, beta, one, out):  # type: ignore[no-untyped-def]
             c[x] = min(max(a[x] + beta * (a[x] - b[x]), zero), one)
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _descend(at, slope, bias, step, one, out):  # type: ignore[no-untyped-def]
     """out = at - step (slope + bias), kept within [0, 1]."""
     zero = one - one
@@ -39,7 +38,7 @@ def _descend(at, slope, bias, step, one, out):  # type: ignore[no-untyped-def]
             o[x] = min(max(a[x] - step * (g[x] + bias), zero), one)
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _keep(slope, bias, out):  # type: ignore[no-untyped-def]
     """out = slope + bias."""
     for k in range(out.shape[0]):
@@ -47,7 +46,7 @@ def _keep(slope, bias, out):  # type: ignore[no-untyped-def]
             out[k, x] = slope[k, x] + bias
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def _count_rows(now, before, beta, one, top, end, counts):  # type: ignore[no-untyped-def]
     """Sums of the rows top..end of the extrapolated materialities."""
     mu = np.empty(now.shape[1:], now.dtype)
@@ -56,7 +55,7 @@ def _count_rows(now, before, beta, one, top, end, counts):  # type: ignore[no-un
         counts[y] = total_row(mu)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _pass_rows(  # type: ignore[no-untyped-def]
     now, before, beta, rho, scale, pairs, views, samples, first, origin, pressure, target, bias,
     w_across, w_along, across, along, step, one, top, end, new, slopes, sums,
@@ -107,7 +106,7 @@ def _pass_rows(  # type: ignore[no-untyped-def]
             _keep(slope, offset, slopes[y])
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def _mean_weights(per_view, first, origin, top, end, weights):  # type: ignore[no-untyped-def]
     """Edge weights of target points in 255ths: the mean over the views that see them."""
     views, _, samples = per_view.shape

@@ -6,19 +6,17 @@ the whole row and nothing branches. View i starts in plane k at column i (first 
 `one` is 1 in the type of the arrays: it keeps bare literals from widening the arithmetic.
 """
 
-from numba import njit
-
-FLAGS = {"contract", "reassoc", "nsz"}  # lets sums vectorise; NaN and infinity stay honest
+from matbench.algorithms.kernels import helper, kernel
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _dim(through, mu, one, beyond):  # type: ignore[no-untyped-def]
     """What is seen one plane further: V (1 - mu)."""
     for x in range(through.size):
         beyond[x] = through[x] * (one - mu[x])
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def see_row(mu, first, origin, one, seen):  # type: ignore[no-untyped-def]
     """V_i(s) = product of (1 - mu) over the nearer points on the ray (equation 3), near to far."""
     views, planes, samples = seen.shape
@@ -29,7 +27,7 @@ def see_row(mu, first, origin, one, seen):  # type: ignore[no-untyped-def]
             _dim(seen[i, k], mu[k, start : start + samples], one, seen[i, k - 1])
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _match(mu, vi, vj, rho, scale, slope, pull_i, pull_j):  # type: ignore[no-untyped-def]
     """Residuals r = mu V_i V_j - rho of one pair in one plane: adds 2 r V_i V_j to `slope`.
 
@@ -48,7 +46,7 @@ def _match(mu, vi, vj, rho, scale, slope, pull_i, pull_j):  # type: ignore[no-un
     return energy
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _shade(mu, through, pull, one, slope, behind):  # type: ignore[no-untyped-def]
     """What a point takes from all behind it on a ray: slope -= V A, then A = g + (1 - mu) A; g = 0 again."""
     for x in range(mu.size):
@@ -57,7 +55,7 @@ def _shade(mu, through, pull, one, slope, behind):  # type: ignore[no-untyped-de
         pull[x] = one - one
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def data_row(mu, seen, rho, scale, pairs, first, origin, one, slope, behind, pull):  # type: ignore[no-untyped-def]
     """E_data of a row (equation 6) and its exact gradient (SPEC 2), far to near.
 
@@ -109,7 +107,7 @@ def data_row(mu, seen, rho, scale, pairs, first, origin, one, slope, behind, pul
     return energy
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _tie(here, there, weight, strength, slope):  # type: ignore[no-untyped-def]
     """strength w (here - there)^2: adds its derivative by `here` to `slope`, returns its sum."""
     energy = strength - strength
@@ -121,7 +119,7 @@ def _tie(here, there, weight, strength, slope):  # type: ignore[no-untyped-def]
     return energy
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@helper
 def _tie_along(mu, weight, strength, slope):  # type: ignore[no-untyped-def]
     """The same between neighbours of a plane's row: weight[x] ties x and x + 1."""
     energy = strength - strength
@@ -137,7 +135,7 @@ def _tie_along(mu, weight, strength, slope):  # type: ignore[no-untyped-def]
     return energy
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def smooth_row(mu, above, below, w_above, w_below, w_along, across, along, slope):  # type: ignore[no-untyped-def]
     """Adjacent-plane part of E_smooth (SPEC 4): what ties a row to the next one and along itself.
 
@@ -166,7 +164,7 @@ def smooth_row(mu, above, below, w_above, w_below, w_along, across, along, slope
     return energy
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def total_row(mu):  # type: ignore[no-untyped-def]
     """Sum of the materialities of a row."""
     energy = 0.0

@@ -8,7 +8,9 @@ from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
 from matbench.algorithm import Context, Estimate
+from matbench.algorithms.fusion import seen_from
 from matbench.algorithms.materiality.binarize import by_plane, by_ray, seen_rays, visible_cost
+from matbench.algorithms.materiality.consensus import consensus
 from matbench.algorithms.materiality.descent import Descent, Energy, edge_weights
 from matbench.algorithms.materiality.start import start
 from matbench.algorithms.semiglobal import SemiGlobal
@@ -16,7 +18,7 @@ from matbench.algorithms.similarity import FULL, Matcher, Matching
 from matbench.scene import Scene
 from matbench.space import Volume
 
-Start = Literal["mean", "soft"]
+Start = Literal["mean", "soft", "consensus"]
 Count = Literal["row", "global"]
 Target = Literal["image", "union"]
 Optimiser = Literal["gradient", "fista"]
@@ -41,9 +43,12 @@ class Materiality(Matching, SemiGlobal):
     ----------
     start
         ``mean``: mu = mean rho, as in the paper; ``soft``: exp(sharpness (mean rho - 1)),
-        normalised along each ray and averaged over the views.
+        normalised along each ray and averaged over the views; ``consensus`` (SPEC 8): every view is
+        read as the control reads the reference, w_i = exp(-sharpness (mean path cost)) normalised
+        along its rays says where they end, V_i(d) = 1 - sum of w_i more than a plane nearer what
+        they reach, and mu = (sum w_i + 0.025) / (sum V_i + 0.25).
     sharpness
-        Of the soft start.
+        Of the start.
     count
         lambda of the count term (7).
     counted
@@ -67,7 +72,7 @@ class Materiality(Matching, SemiGlobal):
         ``plane``: the N most material points of each epipolar plane, then the nearest on each ray
         (the paper; pixels may stay without an answer); ``ray``: argmax of mu V on each ray;
         ``volume``: semi-global over the whole map at once, with the cost of a point
-        (sum V_ij (1 - rho_ij) + 0.1 hidden) / (sum V_ij + 0.1) + material (1 - mu), V_ij being the
+        (sum V_ij (1 - rho_ij) + 0.25 hidden) / (sum V_ij + 0.25) + material (1 - mu), V_ij being the
         product of the visibilities of the pair's views other than the reference.
     hidden
         The cost of a point that no pair sees.
@@ -96,8 +101,8 @@ class Materiality(Matching, SemiGlobal):
         }
     }
 
-    start: Start = field(default="soft", validator=validators.in_(get_args(Start)))
-    sharpness: float = field(default=20.0, validator=validators.gt(0))
+    start: Start = field(default="consensus", validator=validators.in_(get_args(Start)))
+    sharpness: float = field(default=30.0, validator=validators.gt(0))
     count: float = field(default=0.3, validator=validators.ge(0))
     counted: Count = field(default="row", validator=validators.in_(get_args(Count)))
     target: Target = field(default="image", validator=validators.in_(get_args(Target)))
@@ -105,11 +110,11 @@ class Materiality(Matching, SemiGlobal):
     along: float = field(default=6.0, validator=validators.ge(0))
     edge: float = field(default=10.0, validator=validators.gt(0))
     optimiser: Optimiser = field(default="fista", validator=validators.in_(get_args(Optimiser)))
-    passes: int = field(default=30, validator=validators.ge(0))
+    passes: int = field(default=5, validator=validators.ge(0))
     tolerance: float = field(default=0.0, validator=validators.ge(0))
     binarization: Binarization = field(default="volume", validator=validators.in_(get_args(Binarization)))
-    hidden: float = field(default=0.6, validator=validators.ge(0))
-    material: float = field(default=0.1, validator=validators.ge(0))
+    hidden: float = field(default=0.7, validator=validators.ge(0))
+    material: float = field(default=0.25, validator=validators.ge(0))
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """The reference view's map, the materialities, and the energies of every pass."""
@@ -123,7 +128,12 @@ class Materiality(Matching, SemiGlobal):
                     f"similarity/{matcher.indices[i]}-{matcher.indices[j]}", Volume(space, values, matcher.indices)
                 )
         energy = self._energy(matcher, rho, threads)
-        mu = start(matcher, rho, self.start == "soft", self.sharpness, threads)
+        compared = matcher.comparisons
+        if self.start == "consensus":
+            compared += sum(seen_from(matcher, view).ray_comparisons for view in range(space.views))
+            mu = consensus(matcher, self, self.sharpness, threads)
+        else:
+            mu = start(matcher, rho, self.start == "soft", self.sharpness, threads)
 
         def tell(step: int, energies: dict[str, float], now: NDArray[np.float32], slopes: NDArray[np.float32]) -> None:
             probe.iteration(
@@ -143,7 +153,7 @@ class Materiality(Matching, SemiGlobal):
             work={
                 "passes": passes,
                 "point_updates": passes * mu.size,
-                "pair_similarities": matcher.comparisons,
+                "pair_similarities": compared,
             },
         )
 

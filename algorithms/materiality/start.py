@@ -1,16 +1,14 @@
 """Where the descent starts (SPEC 3): from the mean similarity, or softly."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from matbench.algorithms.kernels import kernel
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.similarity import FULL, Matcher
 
-FLAGS = {"contract", "reassoc", "nsz"}
 
-
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def mean_similarity(rho, pairs, first, origin, samples, mean):  # type: ignore[no-untyped-def]
     """Mean of the similarities over the pairs with both frusta; 0 where there is none.
 
@@ -43,7 +41,7 @@ def mean_similarity(rho, pairs, first, origin, samples, mean):  # type: ignore[n
                 total[x] *= count[x]
 
 
-@njit(nogil=True, cache=True, fastmath=FLAGS)
+@kernel
 def soften(mean, views, first, origin, samples, sharpness):  # type: ignore[no-untyped-def]
     """exp(sharpness (mean - 1)), normalised along each ray, averaged over the views that see a point.
 
@@ -103,27 +101,3 @@ def start(
 
     over_rows(fill, space.rows, threads)
     return mu
-
-
-def mean_cost(matcher: Matcher, threads: int = 1) -> NDArray[np.float32]:
-    """(H, W, planes) 1 - mean rho on the reference view's pixel rays; NaN where no pair has both frusta.
-
-    Similarities are computed by blocks of rows and not kept.
-    """
-    space, view = matcher.space, matcher.scene.ref
-    cost = np.empty((space.rows, space.width, space.planes), np.float32)
-    compared = np.zeros((1, space.planes, space.columns), bool)
-    for k in range(space.planes):
-        for i, j in matcher.pairs:
-            start_i, start_j = space.start(i, k), space.start(j, k)
-            compared[0, k, max(start_i, start_j) : max(0, min(start_i, start_j) + space.samples)] = True
-    unknown = ~space.in_view(compared, view)[0].T
-
-    def fill(first: int, end: int) -> None:
-        mean = np.empty((end - first, space.planes, space.columns), np.float32)
-        mean_similarity(matcher.block(first, end), matcher.pairs, space.first, space.origin, space.samples, mean)
-        cost[first:end] = 1 - space.in_view(mean, view).transpose(0, 2, 1)
-        cost[first:end, unknown] = np.nan
-
-    over_rows(fill, space.rows, threads)
-    return cost

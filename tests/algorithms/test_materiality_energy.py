@@ -5,11 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from matbench.algorithms.fusion import seen_from, view_cost
 from matbench.algorithms.materiality.binarize import PRIOR, by_plane, by_ray, seen_rays, visible_cost
+from matbench.algorithms.materiality.consensus import consensus
 from matbench.algorithms.materiality.descent import Energy, edge_weights
 from matbench.algorithms.materiality.energy import data_row, see_row, smooth_row, total_row
 from matbench.algorithms.materiality.start import mean_similarity, soften
-from matbench.algorithms.similarity import pairs
+from matbench.algorithms.semiglobal import SemiGlobal
+from matbench.algorithms.similarity import Matcher, Matching, pairs
+from matbench.scene import Range, Scene
 from matbench.space import DisparitySpace, Volume, visibility
 
 SPACES = st.builds(
@@ -188,6 +192,36 @@ def test_starts_and_reading_are_their_twins(space, which, seed):
     cost, material = visible_cost(mu, rho, space, which, view, 0.6, 2)
     np.testing.assert_allclose(cost, space.in_view(total / weight, view).transpose(0, 2, 1), atol=1e-5)
     np.testing.assert_array_equal(material, space.in_view(mu, view).transpose(0, 2, 1))
+
+
+def consensus_twin(matcher, reader, sharpness):
+    """mu = (sum w + 0.025) / (sum V + 0.25), point by point."""
+    space = matcher.space
+    ended, reached = np.full(space.shape, 0.025), np.full(space.shape, 0.25)
+    for view in range(space.views):
+        seen = seen_from(matcher, view)
+        cost = view_cost(seen)
+        mean = reader.sums(cost, seen.scene.views[view]).astype(float) / 8
+        ends = np.where(np.isnan(cost), 0, np.exp(-sharpness * (mean - mean.min(axis=2, keepdims=True))))
+        ends /= np.maximum(ends.sum(axis=2, keepdims=True), 1e-300)
+        for k, u in np.ndindex(space.planes, space.samples):
+            left, share = divmod(u, space.fineness)
+            share /= space.fineness
+            right = min(left + 1, space.width - 1)
+            for volume, values in ((ended, ends[..., k]), (reached, 1 - ends[..., k + 2 :].sum(axis=2))):
+                volume[:, k, space.start(view, k) + u] += (1 - share) * values[:, left] + share * values[:, right]
+    return np.minimum(1, ended / reached)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(2, 4), st.integers(-2, 1), st.integers(0, 4), st.integers(1, 3), st.integers(0, 99))
+def test_consensus_is_its_twin(n, least, extent, fineness, seed):
+    views = np.random.default_rng(seed).integers(0, 256, (n, 3, 5, 3), dtype=np.uint8)
+    scene = Scene("random", views, tuple(map(str, range(n))), n // 2, Range(least, least + extent), {}, 1.0)
+    matcher = Matcher.of(scene, Matching(fineness=fineness))
+    expected = consensus_twin(matcher, SemiGlobal(), 20.0)
+    for threads in (1, 2):
+        np.testing.assert_allclose(consensus(matcher, SemiGlobal(), 20.0, threads), expected, atol=1e-4)
 
 
 def test_edge_weights_are_means_over_the_views_that_see():

@@ -16,13 +16,27 @@ def random_scene(n=3, height=4, width=6, least=-1.0, largest=2.0, seed=0, pair_s
     return Scene("random", views, labels, n // 2, Range(least, largest), {}, pair_steps)
 
 
+def slope(row, sample, q):
+    """Half the difference of the samples one pixel to either side, those beyond an edge taken from it."""
+    return (row[min(sample + q, row.size - 1)] - row[max(sample - q, 0)]) / 2
+
+
+def darker(grey, y, sample, q):
+    """Which of the 7x7 pixels around are darker, those beyond an edge taken from it."""
+    height, samples = grey.shape
+    around = np.arange(-3, 4)
+    taps = grey[np.clip(y + around, 0, height - 1)][:, np.clip(sample + q * around, 0, samples - 1)]
+    return taps < grey[y, sample]
+
+
 def twin(matcher: Matcher) -> np.ndarray:
-    """exp(-MSD / sigma^2) or exp(-RMS / sigma), tap by tap."""
+    """exp(-MSD / sigma^2), exp(-RMS / sigma) or 1 - mixed cost, tap by tap."""
     space, how = matcher.space, matcher.settings
     rows = fine_rows(matcher.scene.views, space.fineness).astype(float)
     if not how.colour:
         rows = np.repeat(np.tensordot(rows, [0.299, 0.587, 0.114], ([1], [0]))[:, None], 3, axis=1)
-    limit, radius, q = how.truncation**2 or np.inf, how.window // 2, space.fineness
+    limit, radius, q = how.truncation or np.inf, how.window // 2, space.fineness
+    grey = np.tensordot(rows, [0.299, 0.587, 0.114], ([1], [0]))
     out = np.zeros((space.rows, len(matcher.pairs), space.planes, space.columns))
     for y, p, k, c in np.ndindex(out.shape):
         i, j = matcher.pairs[p]
@@ -35,9 +49,19 @@ def twin(matcher: Matcher) -> np.ndarray:
                 inside = 0 <= y + dy < space.rows
                 if inside and min(ui, uj) + dx >= 0 and max(ui, uj) + dx < space.samples:
                     gap = rows[i, :, y + dy, ui + dx] - rows[j, :, y + dy, uj + dx]
-                    taps.append(min(np.mean(gap**2), limit))
+                    if how.similarity == "mixed":
+                        slopes = [slope(grey[v, y + dy], u + dx, q) for v, u in ((i, ui), (j, uj))]
+                        order = [darker(grey[v], y + dy, u + dx, q) for v, u in ((i, ui), (j, uj))]
+                        cost = (
+                            0.35 * min(np.mean(np.abs(gap)), limit) / 20
+                            + 0.25 * min(abs(slopes[0] - slopes[1]), 10) / 10
+                        )
+                        taps.append(cost + 0.40 * min(np.sum(order[0] != order[1]), 20) / 20)
+                    else:
+                        taps.append(min(np.mean(gap**2), limit**2))
         mean = np.mean(taps)
-        out[y, p, k, c] = np.exp(-mean / how.sigma**2 if how.similarity == "ssd" else -np.sqrt(mean) / how.sigma)
+        forms = {"ssd": np.exp(-mean / how.sigma**2), "rms": np.exp(-np.sqrt(mean) / how.sigma)}
+        out[y, p, k, c] = forms.get(how.similarity, max(0.0, 1 - mean))
     return out
 
 
@@ -50,8 +74,8 @@ def twin(matcher: Matcher) -> np.ndarray:
     extent=st.integers(0, 3),
     fineness=st.integers(1, 3),
     window=st.sampled_from([1, 3, 5]),
-    which=st.sampled_from(["all", "consecutive"]),
-    form=st.sampled_from(["ssd", "rms"]),
+    which=st.sampled_from(["all", "consecutive", "reference"]),
+    form=st.sampled_from(["ssd", "rms", "mixed"]),
     truncation=st.sampled_from([0.0, 60.0]),
     colour=st.booleans(),
     seed=st.integers(0, 99),
@@ -99,6 +123,7 @@ def test_comparisons_counts_points_in_both_frusta():
 def test_pairs():
     assert pairs(4, "consecutive").tolist() == [[0, 1], [1, 2], [2, 3]]
     assert pairs(3, "all").tolist() == [[0, 1], [0, 2], [1, 2]]
+    assert pairs(4, "reference", 2).tolist() == [[0, 2], [1, 2], [2, 3]]
 
 
 def test_falloff_is_one_for_equal_windows_and_ends_at_zero():
