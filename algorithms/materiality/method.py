@@ -138,7 +138,7 @@ class Materiality(Matching, SemiGlobal):
         def tell(step: int, energies: dict[str, float], now: NDArray[np.float32], slopes: NDArray[np.float32]) -> None:
             probe.iteration(
                 step,
-                energies,
+                {name: value for name, value in energies.items() if name != "restart"},
                 volume=Volume(space, now, matcher.indices),
                 derivative=Volume(space, slopes.copy(), matcher.indices),
                 disparity=self._disparity(matcher, now, rho, threads),
