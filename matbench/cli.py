@@ -236,7 +236,8 @@ def _print_tables(results: Any, cells: Any, switches: Any, metric: str, console:
     for table in tables.terminal(results, cells, metric, higher, console.width):
         console.print(table)
     if switches is not None:
-        console.print(effects.terminal(switches, metric))
+        for table in effects.terminal(switches, metric):
+            console.print(table)
 
 
 @app.command(name="list")

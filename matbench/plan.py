@@ -111,9 +111,11 @@ def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[
         instance = spec.build(plugin.name, plugin.load(), one.options)
         if not callable(getattr(instance, "solve", None)):
             raise UserError(f"{plugin.name} from {plugin.source} is no method: it has no solve(scene, context)")
-        changed = spec.text(spec.changed(instance))
-        method = Method(plugin.name, spec.values_of(instance), changed, plugins.code_digest(plugin))
-        found.setdefault(str(method), method)
+        preset = one.options.get("preset") if "preset" not in spec.parameters(type(instance)) else None
+        changed = spec.text(spec.changed(instance, preset))
+        params = spec.values_of(instance)
+        method = Method(plugin.name, params, changed, plugins.code_digest(plugin))
+        found.setdefault(spec.label(plugin.name, params), method)  # spelled in two ways, it is one method
     return list(found.values())
 
 

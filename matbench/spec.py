@@ -204,10 +204,13 @@ def values_of(instance: object) -> dict[str, Value]:
 _MISSING = object()
 
 
-def changed(instance: object) -> dict[str, Value]:
-    """Only those parameters that differ from their defaults."""
-    fields = parameters(type(instance))
-    return {key: value for key, value in values_of(instance).items() if value != fields[key][1]}
+def changed(instance: object, preset: str | None = None) -> dict[str, Value]:
+    """Only those parameters that differ from their defaults, or the preset's name and what differs from it."""
+    cls = type(instance)
+    base = {key: default for key, (_, default) in parameters(cls).items()}
+    named: dict[str, Value] = {} if preset is None else {"preset": preset}
+    base |= presets_of(cls)[preset] if preset is not None else {}
+    return named | {key: value for key, value in values_of(instance).items() if value != base[key]}
 
 
 def first_line(error: BaseException) -> str:

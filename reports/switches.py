@@ -36,22 +36,20 @@ def lines(ablation: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["switch", "region", "change", "interval", "size", "scenes", "verdict"])
 
 
-def terminal(ablation: pd.DataFrame, metric: str = METRIC) -> Table:
-    """The mean changes of one metric with their intervals over scenes, a block of regions for each switch."""
+def terminal(ablation: pd.DataFrame, metric: str = METRIC) -> list[Table]:
+    """The mean changes of one metric with their intervals over scenes, a table for each switch."""
     units = ablation.loc[ablation["metric"] == metric, "unit"]
     unit = f" ({units.iloc[0]})" if len(units) else ""
-    title = Text(f"What each switch does to {metric}{unit}")
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("switch", overflow="fold", min_width=12)
-    for head in ("region", "change", "interval", "size", "scenes", "verdict"):
-        table.add_column(head, justify="left" if head in ("region", "verdict") else "right", no_wrap=True)
-    last = None
-    for switch, *values in lines(ablation, metric).to_numpy().tolist():
-        if last not in (None, switch):
-            table.add_section()
-        table.add_row(Text(switch if switch != last else ""), *(Text(value) for value in values))
-        last = switch
-    return table
+    out = []
+    for switch, rows in lines(ablation, metric).groupby("switch", sort=False):
+        title = Text(f"{switch}: change of {metric}{unit}")
+        table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+        for head in rows.columns[1:]:
+            table.add_column(head, justify="left" if head in ("region", "verdict") else "right")
+        for values in rows.to_numpy().tolist():
+            table.add_row(*(Text(value) for value in values[1:]))
+        out.append(table)
+    return out
 
 
 def latex(ablation: pd.DataFrame, metric: str = METRIC) -> str:

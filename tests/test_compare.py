@@ -15,6 +15,7 @@ import pytest
 import matbench
 from matbench import comparison
 from matbench.errors import UserError
+from matbench.plan import methods
 from matbench.scoring import RESULT_COLUMNS
 
 METHODS = Path(__file__).with_name("methods.py")
@@ -302,3 +303,8 @@ def test_a_malformed_request_is_refused(tmp_path: Path, content: str, said: str)
     with pytest.raises(UserError, match=r"request\.toml") as error:
         comparison.read_request(tmp_path / "request.toml")
     assert said in str(error.value)
+
+
+def test_a_method_in_two_spellings_is_one(tmp_path: Path) -> None:
+    selectors = ["materiality[preset=paper]", "materiality[preset=paper passes=50]", "sgbm", "sgbm[fill=true]"]
+    assert [str(method) for method in methods(selectors)] == ["materiality[preset=paper]", "sgbm"]

@@ -79,6 +79,12 @@ def test_only_changed_parameters_name_a_method() -> None:
     assert changed(Sample()) == {}
 
 
+def test_a_preset_names_a_method_with_what_differs_from_it() -> None:
+    sample = build("sample", Sample, {"preset": "paper", "fill": "true"})
+    assert text(changed(sample, "paper")) == "preset=paper fill=true"
+    assert text(changed(Sample(3, fill=False), "paper")) == "preset=paper"
+
+
 def test_a_preset_is_a_start_that_options_override() -> None:
     assert build("sample", Sample, {"preset": "paper", "fill": "true"}) == Sample(3, fill=True)
 
