@@ -1,5 +1,6 @@
 """What each switch of a method does, in a terminal, on the page and in LaTeX."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -14,12 +15,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+def _of(ablation: pd.DataFrame, metric: str, regions: Sequence[str]) -> pd.DataFrame:
+    """The rows of a metric, switch by switch, regions in the order given."""
+    shown = ablation[(ablation["metric"] == metric) & ablation["region"].isin(regions)]
+    place = {region: i for i, region in enumerate(regions)}
+    switch = shown.groupby(["algorithm", "factor", "level"], sort=False).ngroup()
+    order = shown.assign(switch=switch, place=shown["region"].map(place)).sort_values(["switch", "place"])
+    return shown.loc[order.index]
+
+
 def lines(ablation: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
     """One row for each algorithm, factor, level and region: what is shown, as texts.
 
     Columns: switch, region, change, interval, size, scenes, verdict; changes in the metric's unit.
     """
-    shown = ablation[(ablation["metric"] == metric) & ablation["region"].isin(REGIONS)]
+    shown = _of(ablation, metric, REGIONS)
     several = ablation["algorithm"].nunique() > 1
     rows = [
         {
@@ -62,7 +72,7 @@ def latex(ablation: pd.DataFrame, metric: str = METRIC) -> str:
 
 def forest(ablation: pd.DataFrame, metric: str = METRIC) -> "Figure | None":
     """A forest plot: a line for each switch and region, its mean change and interval; None without any."""
-    shown = ablation[(ablation["metric"] == metric) & ablation["region"].isin(["nonocc", "all", "occ"])]
+    shown = _of(ablation, metric, ("nonocc", "all", "occ"))
     if not len(shown):
         return None
     from matplotlib.figure import Figure
@@ -78,6 +88,7 @@ def forest(ablation: pd.DataFrame, metric: str = METRIC) -> "Figure | None":
         axes.plot([row["change"]], [place], marker="o", ms=6, color="#3b78c3", mec=INK, mew=0.8, ls="")
     axes.axvline(0, color=INK, lw=0.8, ls=(0, (3, 3)), alpha=0.6)
     names = [f"{row['factor']} {row['base']} → {row['level']}, {row['region']}" for row in rows]
+    axes.set_ylim(-0.6, len(rows) - 0.4)
     axes.set_yticks(list(places), names, color=INK, parse_math=False)
     axes.set_xlabel(f"change of {metric}, {shown['unit'].iloc[0]}: left of the line is lower", color=INK)
     axes.tick_params(colors=INK)
