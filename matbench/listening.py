@@ -94,18 +94,20 @@ class RecordingProbe(Probe):
         return plane
 
     def similarity(self) -> NDArray[np.uint8] | None:
-        """(planes, columns, 3): three pairs as red, green and blue; neighbouring views come first.
+        """(planes, columns, 3): three pairs as red, green and blue.
 
-        Of more than three such pairs the first, the middle and the last; channels without a pair
-        are 0.
+        Pairs of neighbouring views, if there are three: of more the first, the middle and the last.
+        Else the three whose views are least apart. Channels without a pair are 0.
         """
         if not self.similarities:
             return None
-        least = min(map(_apart, self.similarities))
-        near = [values for name, values in self.similarities.items() if _apart(name) == least]
-        shape = near[0].shape
-        alike = [values for values in near if values.shape == shape]
-        chosen = [alike[i] for i in sorted({0, len(alike) // 2, len(alike) - 1})]
+        names = sorted(self.similarities, key=_apart)
+        shape = self.similarities[names[0]].shape
+        alike = [name for name in names if self.similarities[name].shape == shape]
+        near = [name for name in alike if _apart(name) == _apart(names[0])]
+        pool = near if len(near) >= 3 else alike[:3]
+        in_order = [self.similarities[name] for name in self.similarities if name in pool]
+        chosen = [in_order[i] for i in sorted({0, len(pool) // 2, len(pool) - 1})]
         picture = np.zeros((*shape, 3), np.uint8)
         for channel, values in enumerate(chosen):
             picture[:, :, channel] = values

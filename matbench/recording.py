@@ -279,7 +279,8 @@ class _Writer:
         for index in seen.tolist():
             label = scene.labels[volume.views[index]]
             self._volume("visibility", label, volume=drawing.reduced(volume, row, index))
-        cells = drawing.voxels(whole, MATERIAL, VOXELS, self.ends)
+        step = volume.views[1] - volume.views[0]  # the space's disparities are per step of its own views
+        cells = drawing.voxels(whole, MATERIAL, VOXELS, (self.ends[0] * step, self.ends[1] * step))
         grid = rr.VoxelGridMap(cells.indices, cells.size, colors=cells.colors, translation=cells.origin)
         self.log("space", what=rr.ViewCoordinates.RDF)
         self.log("space", "materiality", what=grid)

@@ -379,3 +379,30 @@ def test_the_web_viewer_answers_and_ends_with_ctrl_c(path: Path, tmp_path: Path)
         assert served.wait(timeout=10) == 0
     with pytest.raises(OSError, match="refused"):
         urllib.request.urlopen(address, timeout=10)  # noqa: S310
+
+
+def test_pairs_of_a_reference_fill_all_three_colours() -> None:
+    space = DisparitySpace(5, 2, 4, 0, 1)
+    probe = RecordingProbe(0)
+    for pair, value in ((("0", "2"), 0.2), (("1", "2"), 0.4), (("2", "3"), 0.6), (("2", "4"), 0.8)):
+        values = np.full(space.shape, value, np.float32)
+        probe.volume(f"similarity/{'-'.join(pair)}", Volume(space, values, (0, 1, 2, 3, 4)))
+    shown = probe.similarity()
+    assert shown is not None
+    assert shown[0, 0].tolist() == [51, 102, 153]  # 0-2, 1-2 and 2-3: those least apart
+
+
+def test_voxels_of_fewer_views_have_the_colours_of_the_disparity_map(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    views = rng.integers(0, 256, (5, 4, 8, 3), np.uint8)
+    truth = np.tile(np.linspace(0, 2, 8, dtype=np.float32), (4, 1))
+    scene = Scene("a", views, tuple("01234"), 0, Range(0, 2), {0: truth}, 1)
+    space = DisparitySpace(3, 4, 8, 0, 4)  # views 0, 2, 4: disparities are twice those of the scene
+    values = np.zeros(space.shape, np.float32)
+    values[:, 2] = 1
+    path = tmp_path / "a.rrd"
+    record(path, scene, lambda probe: Estimate({0: truth}, Volume(space, values, (0, 2, 4))), title="a")
+    grid = read(path)["/space/materiality"][0][1]
+    colors = np.asarray(grid["VoxelGridMap:colors"]).ravel()
+    middle = coloring.disparity_colors(np.array([[1.0]], np.float32), (0, 2))[0, 0]
+    assert {tuple(int(c).to_bytes(4, "big")[:3]) for c in colors} == {tuple(middle.tolist())}
