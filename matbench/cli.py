@@ -39,6 +39,8 @@ app = App(
 
 `matbench compare --plugin mine.py -a mine -s 'synthetic/box[noise=0,4,8]' --record`
 
+`matbench ablate 'materiality[pairs=all,consecutive]' -s 'middlebury*/*' --data DATA`
+
 `matbench list`  methods with their parameters, scenes, metrics
 
 `matbench view runs/1a2b3c4d`  open a recording
@@ -63,7 +65,7 @@ Seeds = Annotated[
 ]
 
 
-@app.command
+@app.command(help_epilogue="")
 def compare(
     *,
     algorithm: Annotated[
@@ -105,7 +107,7 @@ def compare(
     return _work(ready, metric)
 
 
-@app.command
+@app.command(help_epilogue="")
 def ablate(
     selector: str,
     *,
@@ -123,16 +125,16 @@ def ablate(
     Differences are paired by scene, all else equal; intervals and effect sizes are over scenes.
     The first value of a parameter is the base that the others are compared with.
 
-    Parameters
-    ----------
-    selector
-        Method with several values for its parameters, or a TOML file with `algorithms` and `scenes`.
-
     **Examples**
 
     `matbench ablate 'materiality[pairs=all,consecutive binarization=plane,volume]' -s 'middlebury*/*' --data DATA`
 
     `matbench ablate algorithms/ablations/pairs.toml --data DATA`
+
+    Parameters
+    ----------
+    selector
+        Method with several values for its parameters, or a TOML file with `algorithms` and `scenes`.
     """
     from matbench import ablation, comparison
     from matbench.plan import methods
@@ -240,7 +242,7 @@ def _print_tables(results: Any, cells: Any, switches: Any, metric: str, console:
             console.print(table)
 
 
-@app.command(name="list")
+@app.command(name="list", help_epilogue="")
 def list_(
     *,
     data: Data = None,
@@ -267,7 +269,7 @@ def list_(
     return DONE
 
 
-@app.command
+@app.command(help_epilogue="")
 def view(
     run: Path,
     cell: str | None = None,
@@ -276,18 +278,18 @@ def view(
 ) -> int:
     """Open the recording of a cell.
 
+    **Examples**
+
+    `matbench view runs/1a2b3c4d`
+
+    `matbench view runs/1a2b3c4d 'materiality on synthetic/box' --web`
+
     Parameters
     ----------
     run
         Run folder that was written with `compare --record`.
     cell
         Part of the cell's name or key; not needed where there is only one recording.
-
-    **Examples**
-
-    `matbench view runs/1a2b3c4d`
-
-    `matbench view runs/1a2b3c4d 'materiality on synthetic/box' --web`
     """
     from matbench import recording
     from matbench.store import Store

@@ -126,6 +126,6 @@ def _finish(pool: ProcessPool, job: Job, store: Store) -> Outcome:
         with store.building(job.cell) as draft:
             write_cell(draft, job.cell, crashed)
         return crashed
-    except OSError as error:
-        return Outcome("failed", reason=f"its folder could not be written: {error}")
+    except Exception as error:  # the disk is full, say: a method's own failure is told in its cell
+        return Outcome("failed", reason=f"its cell could not be written: {type(error).__name__}: {error}")
     return store.outcome(job.cell) or Outcome("failed", reason="the cell's process left no result")
