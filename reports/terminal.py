@@ -1,5 +1,7 @@
 """The tables of a run in a terminal: 80 columns are enough, names are never read as markup."""
 
+from collections.abc import Iterable
+
 import pandas as pd
 from rich import box
 from rich.table import Table
@@ -76,6 +78,12 @@ def _summary(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: 
     return table
 
 
+def _short(scenes: Iterable[str]) -> dict[str, str]:
+    """Scenes without their datasets, where they can still be told apart."""
+    tails = {scene: scene.partition("/")[2] or scene for scene in scenes}
+    return tails if len(set(tails.values())) == len(tails) else {scene: scene for scene in tails}
+
+
 def _headings(methods: list[str], numbers: dict[str, int], room: int) -> list[str]:
     """Names broken after underscores where they fit side by side, else the summary's numbers."""
     names = [m.replace("_", "_\n") for m in methods]
@@ -92,7 +100,8 @@ def _scenes(
     unit = metrics(results).get(metric, "%")
     numbers = {m: i for i, m in enumerate(methods, 1)}
     values = per_scene(results, REGION, metric).reindex(index=list(scope.asked), columns=methods)
-    first = min(max((len(s) for s in scope.asked), default=0), 28)
+    names = _short(scope.asked)
+    first = min(max(map(len, names.values()), default=0), 28)
     heads = _headings(methods, numbers, room - first)
     at_once = len(methods) if not heads[0].startswith("#") else max(1, (room - first) // (7 + _PADDING))
     bad = labelled(cells)
@@ -113,7 +122,7 @@ def _scenes(
                 else _number(row[m], unit, marks.get(m, 0))
                 for m in part
             ]
-            table.add_row(Text(str(scene)), *shown_row)
+            table.add_row(Text(names[str(scene)]), *shown_row)
         out.append(table)
     return out
 
