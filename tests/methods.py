@@ -125,3 +125,12 @@ class Empty:
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         return _flat(scene, np.nan)
+
+
+class Shy:
+    """Fails only while it is recorded."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        if context.probe.active:
+            raise RuntimeError("not before the camera")
+        return _flat(scene, 1)

@@ -308,3 +308,12 @@ def test_a_malformed_request_is_refused(tmp_path: Path, content: str, said: str)
 def test_a_method_in_two_spellings_is_one(tmp_path: Path) -> None:
     selectors = ["materiality[preset=paper]", "materiality[preset=paper passes=50]", "sgbm", "sgbm[fill=true]"]
     assert [str(method) for method in methods(selectors)] == ["materiality[preset=paper]", "sgbm"]
+
+
+def test_a_recording_that_fails_is_said_and_costs_no_score(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "matbench", "compare", "-a", "shy", "--plugin", str(METHODS), "-s", SMALL, "--record"]
+    done = subprocess.run([*line, "--out", "run"], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "not recorded: RuntimeError: not before the camera" in done.stdout
+    assert "matbench view" not in done.stdout
+    assert cells(tmp_path).status["shy"] == "ok"

@@ -1,0 +1,48 @@
+"""The terminal's tables where more is better, and where there is little room."""
+
+import io
+
+import pandas as pd
+from rich.console import Console
+
+from matbench.reports import tables
+
+REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
+
+
+def run_of(metric: str, values: dict[str, float]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    rows = [
+        (method, "", "synthetic/box", "2", 0, region, name, value, "%" if name == metric else "px", 9)
+        for method, value in values.items()
+        for region in REGIONS
+        for name in (metric, "avg")
+    ]
+    columns = ["algorithm", "params", "scene", "view", "seed", "region", "metric", "value", "unit", "pixels"]
+    cells = [(method, "", "synthetic/box", 0, "ok", 1.25, 10.0, "") for method in values]
+    heads = ["algorithm", "params", "scene", "seed", "status", "seconds", "peak_mb", "reason"]
+    return pd.DataFrame(rows, columns=columns), pd.DataFrame(cells, columns=heads)
+
+
+def printed(width: int, *args: object) -> str:
+    console = Console(width=width, record=True, file=io.StringIO())
+    for table in tables.terminal(*args, width):  # type: ignore[arg-type]
+        console.print(table)
+    return console.export_text()
+
+
+def test_where_more_is_better_the_largest_comes_first() -> None:
+    results, cells = run_of("good_1", {"low": 97.46, "high": 98.86})
+    assert tables.summary(results, cells, "good_1", higher=True).index.tolist() == ["high", "low"]
+    assert tables.summary(results, cells, "good_1").index.tolist() == ["low", "high"]
+    text = printed(80, results, cells, "good_1", True)
+    assert text.index("98.86") < text.index("97.46")
+
+
+def test_a_narrow_terminal_keeps_methods_and_times() -> None:
+    results, cells = run_of("total_bad_1", {"materiality": 1.5, "okutomi_kanade": 2.5})
+    wide, narrow = printed(80, results, cells, "total_bad_1", False), printed(60, results, cells, "total_bad_1", False)
+    for name in ("materiality", "okutomi_kanade", "1.25"):
+        assert name in wide
+        assert name in narrow
+    assert "disc" in wide
+    assert "disc" not in narrow
