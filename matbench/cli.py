@@ -1,8 +1,9 @@
-"""The command line: `matbench compare`, `ablate`, `list` and `view`. Heavy imports happen where they are used."""
+"""The command line: all commands of `matbench`. Heavy imports happen where they are used."""
 
 import json
 import os
 import re
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -42,6 +43,8 @@ app = App(
 `matbench ablate 'materiality[pairs=all,consecutive]' -s 'middlebury*/*' --data DATA`
 
 `matbench list`  methods with their parameters, scenes, metrics
+
+`matbench fetch paper`  download the paper's three scenes
 
 `matbench view runs/1a2b3c4d`  open a recording
 """,
@@ -169,6 +172,8 @@ def _check_metric(metric: str) -> None:
 def _work(ready: "Comparison", metric: str, is_ablation: bool = False) -> int:
     """Run, print and report a comparison; the exit status."""
     console = Console()
+    for scene in ready.left_out:
+        console.print(f"without {scene}", markup=False, highlight=False, soft_wrap=True)
     stopped = _run(ready, console)
     results, cells = ready.tables()
     switches = ready.ablation(results) if is_ablation else None
@@ -193,7 +198,8 @@ def _say_missing(missing: Sequence[str], data: Path | None) -> None:
 
         root = data_root(data)
         why = f"not under {root}" if root else f"give the folder of real scenes by --data or {DATA_VARIABLE}"
-        print(f"without {', '.join(missing)}: {why}")
+        place = f" --data {shlex.quote(str(data))}" if data else ""
+        print(f"without {', '.join(missing)}: {why}, or bring them with: matbench fetch paper{place}")
 
 
 def _run(ready: "Comparison", console: Console) -> bool:
@@ -296,6 +302,9 @@ def view(
 
     recording.view(Store(run).recording(cell), web)
     return DONE
+
+
+app.command("matbench.commands.fetch:fetch", name="fetch", help_epilogue="")
 
 
 def main(tokens: Sequence[str] | None = None) -> None:
