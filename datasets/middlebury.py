@@ -103,6 +103,7 @@ class Middlebury:
     def _download(self, name: str, size: str, facts: Facts) -> Download:
         layout = self._layout(name, size)
         default = next(iter(self.known.scenes[name]))
+        alias = {layout.view.format(k): layout.alias.format(k) for k in layout.numbers} if layout.alias else {}
         return Download(
             f"middlebury{self.year}/{name}" + (f"[size={size}]" if size != default else ""),
             folder=PurePosixPath("middlebury", layout.folder, name),
@@ -112,6 +113,9 @@ class Middlebury:
                     count,
                     sha256,
                     also=tuple(f"{Path(file).stem}{end}" for end in _EXTENSIONS if not file.endswith(end)),
+                    offered_as=tuple(
+                        f"{alias[stem]}{end}" for end in _EXTENSIONS if (stem := Path(file).stem) in alias
+                    ),
                     holds=partial(has_pixels, digest=pixels),
                 )
                 for file, (count, sha256, pixels) in facts.files.items()

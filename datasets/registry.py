@@ -36,6 +36,8 @@ class Layout:
         its files, and folders (ending in a slash) of single files.
     view, truth
         File names without extension, the view's number as ``{}``.
+    alias
+        What a view may be called where it is offered, if something else.
     unknown
         The grey level that means unknown; None if there is none.
     largest
@@ -53,6 +55,7 @@ class Layout:
     sources: tuple[str, ...]
     view: str = "view{}"
     truth: str = "disp{}"
+    alias: str | None = None
     unknown: int | None = 0
     largest: float | None = None
     label: str = "{}"

@@ -52,7 +52,10 @@ app = App(
     version=__version__,
 )
 
-Data = Annotated[Path | None, Parameter(name="--data", help="Folder of real scenes; else MATBENCH_DATA names it.")]
+Data = Annotated[
+    Path | None,
+    Parameter(name="--data", help="Folder of real scenes; else MATBENCH_DATA, else where `fetch` puts them."),
+]
 Plugins = Annotated[
     list[Path] | None,
     Parameter(name="--plugin", negative="", help="Python file with methods of your own; may be repeated."),
@@ -77,7 +80,9 @@ def compare(
     ] = None,
     scene: Annotated[
         list[str] | None,
-        _many("-s", "--scene", "Scene or pattern, such as `middlebury2003/teddy[views=0:9:2]` or `synthetic/*`."),
+        _many(
+            "-s", "--scene", "Scene or pattern, such as `middlebury2003/teddy[views=0:9:2]`, `synthetic/*` or `paper`."
+        ),
     ] = None,
     data: Data = None,
     out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,

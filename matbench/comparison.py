@@ -242,7 +242,7 @@ def compare(
         Selectors such as ``"synthetic/*"`` or ``"middlebury2003/teddy[views=0:9:2]"``; the
         synthetic scenes and the paper's three where they are present, if not given.
     data
-        The folder of real scenes; without it the one that MATBENCH_DATA names.
+        The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
     out
         The run folder; ``runs/<digest of the request>`` if not given. A folder that holds the
         same request is resumed.

@@ -49,7 +49,9 @@ class Remote:
     bytes, sha256
         Its size and digest.
     also
-        Other names under which the same content may come or lie, such as ``im0.png`` for ``im0.ppm``.
+        Other names under which the same content may lie, such as ``im0.png`` for ``im0.ppm``.
+    offered_as
+        Further names under which it may be offered; it is then renamed, its suffix kept.
     holds
         Does a file of other bytes hold the same content, such as the same pixels?
     """
@@ -58,6 +60,7 @@ class Remote:
     bytes: int
     sha256: str
     also: tuple[str, ...] = ()
+    offered_as: tuple[str, ...] = ()
     holds: Callable[[Path], bool] = lambda _: False
 
     @property
@@ -115,7 +118,7 @@ class Dataset(Protocol):
         options
             What stood in brackets: ``{"views": "0:9:2", "size": "half"}``.
         root
-            The folder of real scenes (``--data`` or MATBENCH_DATA), if there is one.
+            The folder of real scenes (`matbench.scenes.data_root`), if there is one.
 
         Raises
         ------

@@ -259,7 +259,7 @@ class _Job:
     def _from_folder(self, url: str) -> None:
         for file in self.missing:
             problems = []
-            for name in file.names:
+            for name in (*file.names, *file.offered_as):
                 problems.append(self._single(file, url + quote(name), self.stage / name))
                 if file.name in self.came:
                     break
@@ -275,7 +275,7 @@ class _Job:
             except TransferError as error:
                 return f"{url}: {error}"
             if _is(file, path):
-                self._place(file, path)
+                self._place(file, path, path.name)
                 return ""
             path.unlink()
         return f"{url}: {_MISMATCH}"
@@ -304,7 +304,7 @@ class _Job:
         draft = self.stage / "unpacked"
         with opened(path) as archive:
             for file in self.missing:
-                found = members(archive, file.names)
+                found = members(archive, (*file.names, *file.offered_as))
                 for info in found:
                     draft.unlink(missing_ok=True)
                     try:
@@ -313,7 +313,7 @@ class _Job:
                         problems.append(str(error))
                         continue
                     if _is(file, draft):
-                        self._place(file, draft.replace(self.stage / PurePosixPath(info.filename).name))
+                        self._place(file, draft, PurePosixPath(info.filename).name)
                         break
                     problems.append(f"{info.filename} {_MISMATCH}")
                 if not found:
@@ -322,12 +322,14 @@ class _Job:
             problems.append(f"holds no plain file {', '.join(absent)}")
         return "; ".join(problems)
 
-    def _place(self, file: Remote, path: Path) -> None:
-        """Move a checked file to its place."""
+    def _place(self, file: Remote, path: Path, name: str) -> None:
+        """Move a checked file that was offered as `name` to its place."""
+        if name not in file.names:
+            name = PurePosixPath(file.name).stem + PurePosixPath(name).suffix
         with path.open("rb+") as written:
             os.fsync(written.fileno())
-        path.replace(self.folder / path.name)
-        self.came[file.name] = path.name
+        path.replace(self.folder / name)
+        self.came[file.name] = name
 
 
 def _most(file: Remote) -> int:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from matbench import plugins, scoring, spec
 from matbench.errors import UserError
@@ -69,7 +69,15 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         lines += [f"  {key}={_shown(p['default'])}: {p['type']}" for key, p in facts["parameters"].items()]
         lines += [f"  preset={preset}" for preset in facts["presets"]]
         methods.add_row(escape(name), escape("\n".join(lines)))
-    scenes = Table("scene", "views", "sizes (default first)", "truth", "present", title="Scenes", title_justify="left")
+    scenes = Table(
+        Column("scene", no_wrap=True),
+        "views",
+        "sizes (default first)",
+        "truth",
+        "present",
+        title="Scenes",
+        title_justify="left",
+    )
     for name, facts in everything["scenes"].items():
         if "error" in facts:
             scenes.add_row(escape(name), "", f"[red]{escape(facts['error'])}[/]", "no", "no")

@@ -235,7 +235,7 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     name
         ``dataset/scene``, options in brackets; one value for each.
     data
-        The folder of real scenes; without it the one that MATBENCH_DATA names.
+        The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
 
     Raises
     ------

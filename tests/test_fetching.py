@@ -48,7 +48,7 @@ def toy(site, tmp_path: Path) -> Download:
         pixels = next(iter(pixel_digests(tmp_path / name)))
         (tmp_path / name).unlink()
         also = (f"{Path(name).stem}.png",)
-        files.append(Remote(name, len(raw), sha256(raw).hexdigest(), also, partial(has_pixels, digest=pixels)))
+        files.append(Remote(name, len(raw), sha256(raw).hexdigest(), also, holds=partial(has_pixels, digest=pixels)))
     return Download("toys/box", FOLDER, tuple(files), site.url, ("zip/box.zip", "box/"))
 
 

@@ -159,8 +159,9 @@ def _account(console: Console, results: Sequence[Result], root: Path) -> None:
             _say(console, f"  {reason}")
         if len(result.reasons) > _SHOWN:
             _say(console, f"  and so on, for {len(result.reasons) - _SHOWN} more")
-        _say(console, f"  to place by hand: {' or '.join(result.urls)}")
-        _say(console, f"               into {result.folder}/")
+        for at, url in enumerate(result.urls):
+            _say(console, f"  {'or' if at else 'by hand'} from {url}")
+        _say(console, f"  to {result.folder}/")
     if failed:
         _say(console, "\nthe same command tries again, and checks what was placed by hand")
     came = sum(bool(result.came) and not result.missing for result in results)
