@@ -202,9 +202,9 @@ def _say_missing(missing: Sequence[str], data: Path | None) -> None:
         from matbench.scenes import DATA_VARIABLE, data_root
 
         root = data_root(data)
-        why = f"not under {root}" if root else f"give the folder of real scenes by --data or {DATA_VARIABLE}"
+        why = f"not under {root}" if root else f"give the folder of real scenes by --data or {DATA_VARIABLE}, or"
         place = f" --data {shlex.quote(str(data))}" if data else ""
-        print(f"without {', '.join(missing)}: {why}, or bring them with: matbench fetch paper{place}")
+        print(f"without {', '.join(missing)}: {why}{':' if root else ''} bring them with matbench fetch paper{place}")
 
 
 def _run(ready: "Comparison", console: Console) -> bool:

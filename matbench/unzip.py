@@ -63,14 +63,12 @@ def unpack(archive: ZipFile, info: ZipInfo, target: Path, limit: int) -> int:
         If `target` cannot be written.
     """
     limit = min(limit, max(_FREE, RATIO * info.compress_size))
-    if info.file_size > limit:
-        raise ArchiveError(f"{info.filename} claims {info.file_size} bytes, at most {limit} can be right")
     count = 0
     with target.open("xb") as file:
         for chunk in _chunks(archive, info):
             count += len(chunk)
             if count > limit:
-                raise ArchiveError(f"{info.filename} unpacks to more than {limit} bytes")
+                raise ArchiveError(f"{info.filename} unpacks to more than {limit} bytes: that cannot be right")
             file.write(chunk)
     return count
 

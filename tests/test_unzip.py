@@ -3,6 +3,7 @@
 import io
 import stat
 import struct
+import tracemalloc
 import zipfile
 from contextlib import suppress
 from pathlib import Path
@@ -110,18 +111,18 @@ def claiming(path: Path, size: int) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("packed", "limit", "said"),
+    ("packed", "limit", "most"),
     [
-        (50 * MEBI, MEBI, "claims 52428800 bytes, at most 1048576"),
-        (300 * MEBI, 1000 * MEBI, "claims 314572800 bytes, at most"),  # 1000 to 1 is no picture
+        (50 * MEBI, MEBI, MEBI),
+        (300 * MEBI, 1000 * MEBI, 70 * MEBI),  # 1000 to 1 is no picture
     ],
 )
-def test_bombs_are_not_unpacked(tmp_path: Path, packed: int, limit: int, said: str) -> None:
+def test_bombs_are_not_unpacked(tmp_path: Path, packed: int, limit: int, most: int) -> None:
     path = archive(tmp_path / "a.zip", ("im0.png", bytes(packed)))
     assert path.stat().st_size < packed / 900
-    with opened(path) as made, pytest.raises(ArchiveError, match=said):
+    with opened(path) as made, pytest.raises(ArchiveError, match=r"unpacks to more than \d+ bytes"):
         unpack(made, members(made, ["im0.png"])[0], tmp_path / "out", limit)
-    assert not (tmp_path / "out").exists()
+    assert (tmp_path / "out").stat().st_size <= most
 
 
 @pytest.mark.parametrize("claim", [0, 10, MEBI])
@@ -134,8 +135,12 @@ def test_a_bomb_that_claims_to_be_small_is_not_unpacked_either(tmp_path: Path, c
 
 def test_a_huge_claim_allocates_nothing(tmp_path: Path) -> None:
     path = claiming(archive(tmp_path / "a.zip", ("im0.png", b"small")), 0xFFFFFFF0)
-    with opened(path) as made, pytest.raises(ArchiveError, match="claims 4294967280 bytes"):
+    tracemalloc.start()
+    with opened(path) as made, suppress(ArchiveError):
         unpack(made, members(made, ["im0.png"])[0], tmp_path / "out", MEBI)
+    assert tracemalloc.get_traced_memory()[1] < 10 * MEBI
+    tracemalloc.stop()
+    assert (tmp_path / "out").read_bytes() == b"small"
 
 
 def test_what_is_there_is_not_written_over(tmp_path: Path) -> None:

@@ -1,1 +1,1 @@
-"""The larger commands of the command line, one module each."""
+"""Commands of their own modules, imported when they are typed."""

@@ -12,10 +12,10 @@ from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, Trans
 from matbench import cli
 from matbench.cli import DONE, INTERRUPTED
 from matbench.dataset import Download
+from matbench.downloads import downloads, fetch_root
 from matbench.errors import UserError
 from matbench.fetching import Event, Result, look, site_of
 from matbench.fetching import fetch as bring
-from matbench.scenes import downloads, fetch_root
 from matbench.transfer import PATIENCE, Patience
 
 FAILED = 1
