@@ -15,7 +15,8 @@ from matbench.plugins import kernel_cache
 # numba does not notice changes of what a kernel calls in another file: each state of the code has its own cache
 os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))
 # tests neither find nor touch the scenes of whoever runs them
-os.environ["XDG_DATA_HOME"] = tempfile.mkdtemp(prefix="matbench-tests-")
+_own = tempfile.TemporaryDirectory(prefix="matbench-tests-")
+os.environ["XDG_DATA_HOME"] = _own.name
 
 
 @pytest.fixture(scope="session")

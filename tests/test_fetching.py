@@ -22,7 +22,8 @@ from matbench.errors import UserError
 from matbench.fetching import Result, fetch, look, site_of
 from matbench.transfer import Patience
 
-QUICK = Patience(timeout=0.5, retries=1, pause=0.01)
+QUICK = Patience(timeout=20, retries=1, pause=0.01)
+SHORT = Patience(timeout=0.5, retries=1, pause=0.01)
 FOLDER = PurePosixPath("toys/small/box")
 NAMES = ("im0.ppm", "im1.ppm", "im2.ppm", "disp1.pgm")
 rng = np.random.default_rng(3)
@@ -288,7 +289,7 @@ def test_a_site_that_stalls_is_given_up_for_all_scenes(site, toy: Download, root
     site.faults["zip/box.zip"] = site.faults["box/im0.ppm"] = [("stall", 10)]
     site.forever |= {"zip/box.zip", "box/im0.ppm"}
     scenes = [toy, evolve(toy, name="toys/two", folder=PurePosixPath("toys/two"), sources=("zip/two.zip",))]
-    one, two = fetch(scenes, root, patience=QUICK)
+    one, two = fetch(scenes, root, patience=SHORT)
     assert "does not answer: the connection stalled" in one.reasons[-1]
     assert two.missing == NAMES
     assert "not tried" in two.reasons[0]
@@ -300,7 +301,7 @@ def test_one_file_that_stalls_harms_no_other_scene(site, toy: Download, root: Pa
     site.forever.add("zip/box.zip")
     site.files["zip/box.zip"] = site.files["zip/two.zip"] = WHOLE
     scenes = [toy, evolve(toy, name="toys/two", folder=PurePosixPath("toys/two"), sources=("zip/two.zip",))]
-    one, two = fetch(scenes, root, patience=QUICK)
+    one, two = fetch(scenes, root, patience=SHORT)
     assert one.missing == NAMES
     assert "stalled" in one.reasons[0]
     assert two.missing == ()

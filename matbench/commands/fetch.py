@@ -28,7 +28,9 @@ def fetch(
     *,
     data: Annotated[
         Path | None,
-        Parameter(help="Folder to put scenes in; else MATBENCH_DATA names it, else it is your own, where all look."),
+        Parameter(
+            help="Folder to put scenes in; else MATBENCH_DATA names it, else one of your own, where all commands look."
+        ),
     ] = None,
     mirror: Annotated[
         str | None, Parameter(help="Address that stands in for the official site's, laid out as that is.")
