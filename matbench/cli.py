@@ -309,7 +309,7 @@ def view(
     return DONE
 
 
-app.command("matbench.commands.fetch:fetch", name="fetch", help_epilogue="")
+app.command("matbench.commands.fetch:app", name="fetch", help="Download scenes, check them, and put them in place.")
 
 
 def main(tokens: Sequence[str] | None = None) -> None:

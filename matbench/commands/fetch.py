@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import App, Parameter
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn
@@ -18,10 +18,32 @@ from matbench.fetching import Event, Result, look, site_of
 from matbench.fetching import fetch as bring
 from matbench.transfer import PATIENCE, Patience
 
+app = App(
+    name="fetch",
+    help="Download scenes, check them, and put them in place.",
+    help_epilogue="""\
+Typed again after an interruption, the same command goes on where it was. Files that are there
+already are checked and left alone. Files come from https://vision.middlebury.edu/stereo/data/;
+they are free for research, and ask for citation.
+
+**Examples**
+
+`matbench fetch paper`  the paper's three scenes
+
+`matbench fetch 'middlebury2006/*' --dry-run`
+
+`matbench fetch 'middlebury2006/*[size=half]' middlebury2003/teddy --data ~/stereo`
+
+`matbench fetch middlebury2001/venus --mirror http://localhost:8000`
+""",
+    help_format="markdown",
+)
+
 FAILED = 1
 _SHOWN = 4  # reasons of one scene
 
 
+@app.default
 def fetch(
     scene: Annotated[list[str], Parameter(negative="")],
     /,
@@ -40,20 +62,6 @@ def fetch(
     retries: Annotated[int, Parameter(help="How often to try again while nothing more comes.")] = 4,
 ) -> int:
     """Download scenes, check every file, and put it where `compare` finds it.
-
-    Typed again after an interruption, it goes on where it was. Files that are there already are
-    checked and left alone. Files come from https://vision.middlebury.edu/stereo/data/; they are
-    free for research, and ask for citation.
-
-    **Examples**
-
-    `matbench fetch paper`  the paper's three scenes
-
-    `matbench fetch 'middlebury2006/*' --dry-run`
-
-    `matbench fetch 'middlebury2006/*[size=half]' middlebury2003/teddy --data ~/stereo`
-
-    `matbench fetch middlebury2001/venus --mirror http://localhost:8000`
 
     Parameters
     ----------
