@@ -5,6 +5,7 @@ Decoders fill what is missing with grey and go on, so a file's completeness is c
 
 import re
 import zlib
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,33 @@ def read_size(path: Path) -> tuple[int, int]:
         If the file is missing or has no such header.
     """
     return _size(path, _read(path, 4096))
+
+
+def pixel_digests(path: Path) -> set[str]:
+    """SHA-256 of the decoded picture: the same for a PPM and a PNG of the same pixels.
+
+    Of the ASCII text ``HxWx3:uint8:`` and the bytes of the (H, W, 3) RGB array; where all pixels are
+    grey, also of ``HxW:uint8:`` and those of the (H, W) array.
+
+    Raises
+    ------
+    UserError
+        As `read_rgb`.
+    """
+    image = read_rgb(path)
+    height, width = image.shape[:2]
+    found = {sha256(f"{height}x{width}x3:uint8:".encode() + image.tobytes()).hexdigest()}
+    if (image == image[..., :1]).all():
+        found.add(sha256(f"{height}x{width}:uint8:".encode() + image[..., 0].tobytes()).hexdigest())
+    return found
+
+
+def has_pixels(path: Path, digest: str) -> bool:
+    """Does the file hold the picture of that digest, in whatever format?"""
+    try:
+        return digest in pixel_digests(path)
+    except UserError:
+        return False
 
 
 def _read(path: Path, limit: int = -1) -> bytes:

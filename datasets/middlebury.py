@@ -8,86 +8,30 @@ References: Scharstein & Szeliski, IJCV 2002 (2001); Scharstein & Szeliski, CVPR
 Scharstein & Pal, CVPR 2007, and Hirschmueller & Scharstein, CVPR 2007 (2005, 2006).
 """
 
-import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
+from functools import partial
 from math import ceil
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
-from attrs import field, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench import spec
-from matbench.dataset import Listing
+from matbench.dataset import Download, Listing, Remote
 from matbench.datasets.choose import reference, view_indices
-from matbench.datasets.images import read_grey, read_rgb, read_size
+from matbench.datasets.images import has_pixels, read_grey, read_rgb, read_size
+from matbench.datasets.registry import YEARS, Facts, Layout, Registry, registry, site
 from matbench.errors import UserError, unknown
 from matbench.regions import regions
 from matbench.scene import Range, Scene
 
 OPTIONS = ("ref", "size", "views")
+ROUND_UP = 16  # px of the pair, for ranges that come from the truth itself
 
 _EXTENSIONS = (".png", ".ppm", ".pgm")
 _PREFIXES = ("im", "view")
-_ROUND_UP = 16  # px of the pair, for ranges that come from the truth itself
-
-
-@frozen
-class Layout:
-    """How the files of a scene are named and what its truth means.
-
-    Parameters
-    ----------
-    folder
-        Where the scenes lie, below ``middlebury``.
-    numbers
-        Numbers of the views in file names, left to right.
-    pair
-        Numbers of the two views of the field's pair, the reference view first.
-    grey
-        Grey levels of truth for one pixel of the pair.
-    view, truth
-        File names without extension, the view's number as ``{}``.
-    unknown
-        The grey level that means unknown; None if there is none.
-    largest
-        Largest disparity to search, px of the pair; None takes it from the truth.
-    label
-        What a view is called.
-    with_truth
-        Numbers of the views whose truth may exist, if not those of the pair.
-    """
-
-    folder: str
-    numbers: range
-    pair: tuple[int, int]
-    grey: int
-    view: str = "view{}"
-    truth: str = "disp{}"
-    unknown: int | None = 0
-    largest: float | None = None
-    label: str = "{}"
-    with_truth: tuple[int, ...] = field()
-
-    @with_truth.default
-    def _pair_has_truth(self) -> tuple[int, ...]:
-        return self.pair
-
-    @property
-    def steps(self) -> int:
-        return self.pair[1] - self.pair[0]
-
-
-@cache
-def _facts() -> dict[str, dict[str, dict[str, tuple[int, int]]]]:
-    """Year -> scene -> size -> (width, height)."""
-    text = Path(__file__).with_name("middlebury_facts.json").read_text("utf-8")
-    return {
-        year: {name: {size: (w, h) for size, (w, h) in sizes.items()} for name, sizes in scenes.items()}
-        for year, scenes in json.loads(text).items()
-    }
 
 
 def _find(folder: Path, stem: str) -> Path | None:
@@ -104,41 +48,81 @@ def _found(folder: Path, stem: str) -> Path:
 
 @frozen
 class Middlebury:
-    """One year's scenes.
+    """One year's scenes: those of the registry, and those that only the data root knows.
 
-    Parameters
-    ----------
-    year
-        As in the folder's name.
-    layouts
-        Size -> layout; where nothing is said, the first size that a scene's folders have.
-    special
-        Scenes laid out in a way of their own.
+    Where no size is named, it is the first of the layouts' that a scene's folders have.
     """
 
     year: str
-    layouts: Mapping[str, Layout]
-    special: Mapping[str, Layout] = field(factory=dict)
+
+    @property
+    def known(self) -> Registry:
+        return registry(self.year)
 
     def listings(self, root: Path | None) -> Sequence[Listing]:
         """All scenes of the year, with those that only the data root knows."""
-        known = _facts()[self.year]
-        names = sorted({*known, *self._names_present(root)}, key=lambda name: (name.lower(), name))
-        return [self._listing(name, known.get(name, {}), root) for name in names]
+        names = sorted({*self.known.scenes, *self._names_present(root)}, key=lambda name: (name.lower(), name))
+        return [self._listing(name, root) for name in names]
 
-    def _listing(self, name: str, known: Mapping[str, tuple[int, int]], root: Path | None) -> Listing:
+    def _listing(self, name: str, root: Path | None) -> Listing:
+        facts = self.known.scenes.get(name, {})
         here = self._sizes_present(name, root)
-        sizes = {size: known[size] if size in known else self._size_of(name, size, root) for size in here}
-        sizes |= {size: known[size] for size in self.layouts if size in known and size not in sizes}
-        default = next(iter(sizes))
-        layout = self._layout(name, default)
-        complete = False
-        if root is not None and default in here:
-            folder = self._folder(root, name, default)
-            complete = all(_find(folder, layout.view.format(k)) for k in layout.numbers) and any(
-                _find(folder, layout.truth.format(k)) for k in layout.with_truth
-            )
-        return Listing(name, len(layout.numbers), sizes, complete)
+        sizes = {
+            size: (facts[size].size if size in facts else None) or self._size_of(name, size, root)
+            for size in (*here, *(size for size in facts if size not in here))
+        }
+        complete = frozenset(size for size in here if root is not None and self._is_complete(root, name, size))
+        return Listing(
+            name,
+            len(self._layout(name, next(iter([*sizes, *self.known.layouts]))).numbers),
+            sizes,
+            bool(here) and here[0] in complete,
+            complete=complete,
+            truth=any(fact.truth for fact in facts.values()) or (not facts and bool(complete)),
+        )
+
+    def _is_complete(self, root: Path, name: str, size: str) -> bool:
+        """Can it be loaded, with all views, and scored if it is known to have truth?"""
+        folder, layout = self._folder(root, name, size), self._layout(name, size)
+        return all(_find(folder, layout.view.format(k)) for k in layout.numbers) and (
+            self._lacks_truth(name, size) or any(_find(folder, layout.truth.format(k)) for k in layout.with_truth)
+        )
+
+    def _lacks_truth(self, name: str, size: str) -> bool:
+        """Is it known that no truth of this scene was published?"""
+        facts = self.known.scenes.get(name, {})
+        return size in facts and not facts[size].truth
+
+    def downloads(self) -> Mapping[str, Mapping[str, Download]]:
+        """Scene -> size -> where its files can be had; a scene whose files are not known has no size."""
+        return {
+            name: {size: self._download(name, size, facts) for size, facts in sizes.items()}
+            for name, sizes in self.known.scenes.items()
+        }
+
+    def _download(self, name: str, size: str, facts: Facts) -> Download:
+        layout = self._layout(name, size)
+        default = next(iter(self.known.scenes[name]))
+        alias = {layout.view.format(k): layout.alias.format(k) for k in layout.numbers} if layout.alias else {}
+        return Download(
+            f"middlebury{self.year}/{name}" + (f"[size={size}]" if size != default else ""),
+            folder=PurePosixPath("middlebury", layout.folder, name),
+            files=tuple(
+                Remote(
+                    file,
+                    count,
+                    sha256,
+                    also=tuple(f"{Path(file).stem}{end}" for end in _EXTENSIONS if not file.endswith(end)),
+                    offered_as=tuple(
+                        f"{alias[stem]}{end}" for end in _EXTENSIONS if (stem := Path(file).stem) in alias
+                    ),
+                    holds=partial(has_pixels, digest=pixels),
+                )
+                for file, (count, sha256, pixels) in facts.files.items()
+            ),
+            site=site(),
+            sources=tuple(source.format(scene=name) for source in layout.sources),
+        )
 
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:
         """Load a scene; options are `size`, `views` and `ref`.
@@ -149,14 +133,16 @@ class Middlebury:
         for option in options:
             if option not in OPTIONS:
                 raise unknown(f"option of {called}", option, OPTIONS)
-        folder, layout = self._locate(called, name, options.get("size"), root)
+        folder, size = self._locate(called, name, options.get("size"), root)
+        layout, facts = self._layout(name, size), self.known.scenes.get(name, {}).get(size)
         labels = [layout.label.format(number) for number in layout.numbers]
         chosen = view_indices(called, labels, options.get("views"), _PREFIXES)
         have = [number for number in layout.with_truth if _find(folder, layout.truth.format(number))]
-        if not have:
+        if not have and not self._lacks_truth(name, size):
             raise UserError(f"{called} has no ground truth in {folder}: a scene without it cannot be scored")
         indices = [layout.numbers.index(number) for number in have]
-        ref = reference(called, labels, indices, chosen, options.get("ref"), _PREFIXES)
+        preferred = indices or sorted(range(len(labels)), key=lambda i: layout.numbers[i] != layout.pair[0])
+        ref = reference(called, labels, preferred, chosen, options.get("ref"), _PREFIXES)
 
         images = {ref: read_rgb(_found(folder, layout.view.format(layout.numbers[ref])))}
         height, width = images[ref].shape[:2]
@@ -173,10 +159,10 @@ class Middlebury:
             views=views,
             labels=tuple(labels),
             ref=ref,
-            disparities=Range(0, self._largest(layout, truth.values()) / layout.steps),
+            disparities=Range(0, (facts.largest if facts else self._largest(layout, truth.values())) / layout.steps),
             truth=truth,
             pair_steps=layout.steps,
-            regions=regions(images[ref], truth[ref], other),
+            regions=regions(images[ref], truth[ref], other) if truth else {},
         )
         return full if len(chosen) == len(labels) else full.choose(chosen)
 
@@ -197,37 +183,42 @@ class Middlebury:
         if layout.largest is not None:
             return layout.largest
         nearest = max(float(np.nanmax(truth)) for truth in truths) * layout.steps
-        return max(1, ceil(nearest / _ROUND_UP - 1e-6)) * _ROUND_UP
+        return max(1, ceil(nearest / ROUND_UP - 1e-6)) * ROUND_UP
 
-    def _locate(self, called: str, name: str, size: str | None, root: Path | None) -> tuple[Path, Layout]:
-        """The folder of a scene and its layout.
+    def _locate(self, called: str, name: str, size: str | None, root: Path | None) -> tuple[Path, str]:
+        """The folder of a scene and its size.
 
         Raises
         ------
         UserError
             If the scene or size does not exist, or is not there.
         """
-        known, present = _facts()[self.year], self._names_present(root)
+        known, present = self.known.scenes, self._names_present(root)
         # nothing else is ever joined to a path
         if name not in known and name not in present:
             raise unknown(f"scene of middlebury{self.year}", name, {*known, *present})
-        possible = [s for s in self.layouts if s in known.get(name, {}) or s in self._sizes_present(name, root)]
+        here = self._sizes_present(name, root)
+        possible = [s for s in self.known.layouts if s in known.get(name, {}) or s in here]
         if size is not None and size not in possible:
             raise unknown(f"size of {called}", size, possible)
+        wanted = size or next(iter([*here, *possible]), "")
+        bring = ""
+        if wanted in known.get(name, {}):
+            bring = f"; {self._download(name, wanted, known[name][wanted]).command} brings it"
         if root is None:
             raise UserError(
-                f"{called} is a real scene: name the folder that holds middlebury/ by --data or MATBENCH_DATA"
+                f"{called} is a real scene: name the folder that holds middlebury/ by --data or MATBENCH_DATA{bring}"
             )
-        here = self._sizes_present(name, root)
-        wanted = size or next(iter(here), possible[0])
+        if not wanted:
+            raise UserError(f"{called} is not under {root / 'middlebury'}, and no file of it is known: nothing to load")
         folder = self._folder(root, name, wanted)
         if wanted not in here:
             others = f"size {', '.join(here)}" if here else ", ".join(present) or "no scenes of that year"
-            raise UserError(f"{called} (size {wanted}) is not in {folder}: present: {others}")
-        return folder, self._layout(name, wanted)
+            raise UserError(f"{called} (size {wanted}) is not in {folder}: present: {others}{bring}")
+        return folder, wanted
 
     def _layout(self, name: str, size: str) -> Layout:
-        return self.special.get(name, self.layouts[size])
+        return self.known.special.get(name, self.known.layouts[size])
 
     def _folder(self, root: Path, name: str, size: str) -> Path:
         return root / "middlebury" / self._layout(name, size).folder / name
@@ -239,12 +230,12 @@ class Middlebury:
 
     def _sizes_present(self, name: str, root: Path | None) -> list[str]:
         """The sizes of a scene of that checked name, in order of preference."""
-        return [size for size in self.layouts if root is not None and self._is_present(name, size, root)]
+        return [size for size in self.known.layouts if root is not None and self._is_present(name, size, root)]
 
     def _names_present(self, root: Path | None) -> list[str]:
         if root is None:
             return []
-        parents = {size: root / "middlebury" / layout.folder for size, layout in self.layouts.items()}
+        parents = {size: root / "middlebury" / layout.folder for size, layout in self.known.layouts.items()}
         return sorted(
             {
                 path.name
@@ -256,50 +247,15 @@ class Middlebury:
         )
 
     def _size_of(self, name: str, size: str, root: Path | None) -> tuple[int, int]:
-        """(width, height) as the first view's header states it; (0, 0) if it is damaged."""
-        assert root is not None, "only sizes that are present are looked at"  # noqa: S101
+        """(width, height) as the first view's header states it; (0, 0) if there is none."""
+        if root is None:
+            return 0, 0
         folder, layout = self._folder(root, name, size), self._layout(name, size)
         paths = (_find(folder, layout.view.format(number)) for number in layout.numbers)
         try:
             return read_size(next(path for path in paths if path))
-        except UserError:
+        except (UserError, StopIteration):
             return 0, 0
 
 
-MIDDLEBURY_2001 = Middlebury(
-    "2001",
-    {"full": Layout("scenes2001/data", range(9), (2, 6), 8, view="im{}", unknown=None, largest=19)},
-    {
-        "tsukuba": Layout(
-            "scenes2001/data",
-            range(1, 6),
-            (3, 4),
-            16,
-            view="scene1.row3.col{}",
-            truth="truedisp.row3.col{}",
-            largest=15,
-            label="col{}",
-            with_truth=(3,),
-        )
-    },
-)
-
-MIDDLEBURY_2003 = Middlebury(
-    "2003",
-    {
-        "quarter": Layout("scenes2003/newdata", range(9), (2, 6), 4, view="im{}", largest=59),
-        "half": Layout("scenes2003/newdata/half", range(2, 7), (2, 6), 2, largest=118),
-    },
-)
-
-
-def _in_three_sizes(year: str) -> Middlebury:
-    sizes = {"third": ("ThirdSize", 3), "half": ("HalfSize", 2), "full": ("FullSize", 1)}
-    return Middlebury(
-        year,
-        {size: Layout(f"scenes{year}/{folder}", range(7), (1, 5), grey) for size, (folder, grey) in sizes.items()},
-    )
-
-
-MIDDLEBURY_2005 = _in_three_sizes("2005")
-MIDDLEBURY_2006 = _in_three_sizes("2006")
+MIDDLEBURY_2001, MIDDLEBURY_2003, MIDDLEBURY_2005, MIDDLEBURY_2006 = map(Middlebury, YEARS)

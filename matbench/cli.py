@@ -1,8 +1,9 @@
-"""The command line: `matbench compare`, `ablate`, `list` and `view`. Heavy imports happen where they are used."""
+"""The command line: all commands of `matbench`. Heavy imports happen where they are used."""
 
 import json
 import os
 import re
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -43,13 +44,18 @@ app = App(
 
 `matbench list`  methods with their parameters, scenes, metrics
 
+`matbench fetch paper`  download the paper's three scenes
+
 `matbench view runs/1a2b3c4d`  open a recording
 """,
     help_format="markdown",
     version=__version__,
 )
 
-Data = Annotated[Path | None, Parameter(name="--data", help="Folder of real scenes; else MATBENCH_DATA names it.")]
+Data = Annotated[
+    Path | None,
+    Parameter(name="--data", help="Folder of real scenes; else MATBENCH_DATA, else where `fetch` puts them."),
+]
 Plugins = Annotated[
     list[Path] | None,
     Parameter(name="--plugin", negative="", help="Python file with methods of your own; may be repeated."),
@@ -74,7 +80,9 @@ def compare(
     ] = None,
     scene: Annotated[
         list[str] | None,
-        _many("-s", "--scene", "Scene or pattern, such as `middlebury2003/teddy[views=0:9:2]` or `synthetic/*`."),
+        _many(
+            "-s", "--scene", "Scene or pattern, such as `middlebury2003/teddy[views=0:9:2]`, `synthetic/*` or `paper`."
+        ),
     ] = None,
     data: Data = None,
     out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,
@@ -169,6 +177,8 @@ def _check_metric(metric: str) -> None:
 def _work(ready: "Comparison", metric: str, is_ablation: bool = False) -> int:
     """Run, print and report a comparison; the exit status."""
     console = Console()
+    for scene in ready.left_out:
+        console.print(f"without {scene}", markup=False, highlight=False, soft_wrap=True)
     stopped = _run(ready, console)
     results, cells = ready.tables()
     switches = ready.ablation(results) if is_ablation else None
@@ -192,8 +202,9 @@ def _say_missing(missing: Sequence[str], data: Path | None) -> None:
         from matbench.scenes import DATA_VARIABLE, data_root
 
         root = data_root(data)
-        why = f"not under {root}" if root else f"give the folder of real scenes by --data or {DATA_VARIABLE}"
-        print(f"without {', '.join(missing)}: {why}")
+        why = f"not under {root}" if root else f"give the folder of real scenes by --data or {DATA_VARIABLE}, or"
+        place = f" --data {shlex.quote(str(data))}" if data else ""
+        print(f"without {', '.join(missing)}: {why}{':' if root else ''} bring them with matbench fetch paper{place}")
 
 
 def _run(ready: "Comparison", console: Console) -> bool:
@@ -296,6 +307,9 @@ def view(
 
     recording.view(Store(run).recording(cell), web)
     return DONE
+
+
+app.command("matbench.commands.fetch:app", name="fetch", help="Download scenes, check them, and put them in place.")
 
 
 def main(tokens: Sequence[str] | None = None) -> None:

@@ -20,13 +20,12 @@ from matbench.dataset import Listing
 from matbench.errors import UserError, unknown
 from matbench.plan import Plan, make_plan, methods
 from matbench.scene import Scene
-from matbench.scenes import data_root, listings, load_scene, select
+from matbench.scenes import PAPER_SCENES, Selection, data_root, listings, load_scene, select
 from matbench.store import Store, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
-PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
 RUNS = Path("runs")
 
 
@@ -42,6 +41,8 @@ class Comparison:
         Write a recording of every cell.
     command
         The line that asked for it, for the report.
+    left_out
+        Scenes that a pattern means but that cannot be compared, and why.
     """
 
     plan: Plan
@@ -50,6 +51,7 @@ class Comparison:
     data: Path | None
     record: bool
     command: str
+    left_out: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -202,11 +204,11 @@ def prepare(
     own = [p.name for file in files for p in plugins.from_file(file).values()]
     chosen = methods(algorithms if algorithms is not None else [*default_algorithms(), *own], files)
     root = data_root(data)
-    names = select(scenes, root) if scenes is not None else default_scenes(root)[0]
-    if not chosen or not names:
+    selected = select(scenes, root) if scenes is not None else Selection(tuple(default_scenes(root)[0]))
+    if not chosen or not selected.names:
         raise UserError("nothing to compare: name at least one algorithm and one scene")
     loaded: dict[tuple[str, str], Scene] = {}  # a scene spelled in two ways is one scene
-    for name in names:
+    for name in selected.names:
         scene = load_scene(name, root)
         if scene.ref not in scene.truth:
             raise UserError(f"{name} has no ground truth of its reference view {scene.labels[scene.ref]}: no scores")
@@ -216,7 +218,7 @@ def prepare(
     folder = Path(out) if out is not None else RUNS / plan.digest
     store = Store.open(folder, plan)
     said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
-    return Comparison(plan, store, by_name, root, record, said)
+    return Comparison(plan, store, by_name, root, record, said, selected.left_out)
 
 
 def compare(
@@ -240,7 +242,7 @@ def compare(
         Selectors such as ``"synthetic/*"`` or ``"middlebury2003/teddy[views=0:9:2]"``; the
         synthetic scenes and the paper's three where they are present, if not given.
     data
-        The folder of real scenes; without it the one that MATBENCH_DATA names.
+        The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
     out
         The run folder; ``runs/<digest of the request>`` if not given. A folder that holds the
         same request is resumed.

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from matbench import plugins, scoring, spec
 from matbench.errors import UserError
@@ -50,7 +50,12 @@ def _plain(value: Any) -> Any:
 def _scene(found: Any) -> dict[str, Any]:
     if isinstance(found, UserError):
         return {"error": str(found)}
-    return {"views": found.views, "sizes": {k: list(v) for k, v in found.sizes.items()}, "present": found.present}
+    return {
+        "views": found.views,
+        "sizes": {k: list(v) for k, v in found.sizes.items()},
+        "truth": found.truth,
+        "present": found.present,
+    }
 
 
 def tables(everything: dict[str, Any]) -> list[Table]:
@@ -64,13 +69,22 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         lines += [f"  {key}={_shown(p['default'])}: {p['type']}" for key, p in facts["parameters"].items()]
         lines += [f"  preset={preset}" for preset in facts["presets"]]
         methods.add_row(escape(name), escape("\n".join(lines)))
-    scenes = Table("scene", "views", "sizes (default first)", "present", title="Scenes", title_justify="left")
+    scenes = Table(
+        Column("scene", no_wrap=True),
+        "views",
+        "sizes (default first)",
+        "truth",
+        "present",
+        title="Scenes",
+        title_justify="left",
+    )
     for name, facts in everything["scenes"].items():
         if "error" in facts:
-            scenes.add_row(escape(name), "", f"[red]{escape(facts['error'])}[/]", "no")
+            scenes.add_row(escape(name), "", f"[red]{escape(facts['error'])}[/]", "no", "no")
             continue
-        sizes = ", ".join(f"{size} {w}x{h}" for size, (w, h) in facts["sizes"].items())
-        scenes.add_row(escape(name), str(facts["views"]), sizes, "yes" if facts["present"] else "no")
+        sizes = ", ".join(f"{size} {w}x{h}" if w else size for size, (w, h) in facts["sizes"].items())
+        truth, present = ("yes" if facts[key] else "no" for key in ("truth", "present"))
+        scenes.add_row(escape(name), str(facts["views"]), sizes, truth, present)
     metrics = Table("metric", "unit", "better", "about", title="Metrics", title_justify="left")
     for name, facts in everything["metrics"].items():
         if "error" in facts:

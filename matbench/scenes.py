@@ -2,9 +2,12 @@
 
 import os
 import re
-from collections.abc import Iterable
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
+
+from attrs import frozen
 
 from matbench import plugins
 from matbench.dataset import Dataset, Listing
@@ -13,10 +16,22 @@ from matbench.scene import Scene
 from matbench.spec import Spec, expand, parse
 
 DATA_VARIABLE = "MATBENCH_DATA"
+PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
+GROUPS = {"paper": PAPER_SCENES}
+"""What a selector may name instead of a pattern."""
+
+_NO_TRUTH = "no ground truth"
+
+
+def user_root() -> Path:
+    """This person's own folder of real scenes, where `matbench fetch` puts them; it may not exist yet."""
+    import platformdirs
+
+    return platformdirs.user_data_path("matbench", appauthor=False)
 
 
 def data_root(data: str | Path | None = None) -> Path | None:
-    """The folder of real scenes: `data`, else what MATBENCH_DATA names, else none.
+    """The folder of real scenes: `data`, else what MATBENCH_DATA names, else `user_root` if it exists.
 
     Raises
     ------
@@ -25,7 +40,8 @@ def data_root(data: str | Path | None = None) -> Path | None:
     """
     named = data or os.environ.get(DATA_VARIABLE) or None
     if named is None:
-        return None
+        own = user_root()
+        return own.resolve() if own.is_dir() else None
     root = Path(named).expanduser()
     if not root.is_dir():
         by = "--data" if data else DATA_VARIABLE
@@ -55,8 +71,25 @@ def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
     return found
 
 
-def select(selectors: str | Iterable[str], data: str | Path | None = None) -> list[str]:
-    """The names of the scenes that selectors mean; patterns match scenes that are present.
+@frozen
+class Selection:
+    """Names of scenes, and in words which others a pattern means but cannot have."""
+
+    names: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
+
+
+def group(name: str, known: Iterable[str]) -> list[str] | None:
+    """The names that a pattern, or a name of several scenes such as ``paper``, means; None for a plain name."""
+    if name in GROUPS:
+        return [one for one in GROUPS[name] if one in set(known)]
+    return [one for one in known if fnmatchcase(one, name)] if re.search(r"[*?]", name) else None
+
+
+def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Selection:
+    """The scenes that selectors mean; patterns match scenes that are present and have truth.
+
+    A pattern with a size takes the scenes that are present in it.
 
     Raises
     ------
@@ -64,21 +97,52 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> li
         For a malformed selector, or a pattern that matches no scene present.
     """
     names: dict[str, None] = {}
+    left_out: list[str] = []
     for spec in expand(selectors):
-        if not re.search(r"[*?]", spec.name):
+        known: dict[str, Listing | UserError] = {}
+        if spec.name in GROUPS or re.search(r"[*?]", spec.name):
+            known = listings(data)
+        hits = group(spec.name, known)
+        if hits is None:
             names[str(spec)] = None
             continue
-        known = listings(data)
-        hits = [name for name in known if fnmatchcase(name, spec.name)]
-        present = [name for name in hits if isinstance(known[name], Listing) and known[name].present]  # type: ignore[union-attr]
-        if not present:
-            where = "are known but not under the data folder" if hits else "exists"
-            which = (
-                f"{len(hits)} scenes that {spec.name!r} matches {where}" if hits else f"no scene {spec.name!r} {where}"
-            )
-            raise UserError(f"{which}: see 'matbench list', and give the data folder by --data or {DATA_VARIABLE}")
-        names |= {str(Spec(name, spec.options)): None for name in present}
-    return list(names)
+        size = spec.options.get("size")
+        offered = {name: found for name in hits if isinstance(found := known[name], Listing)}
+        present = {name: found for name, found in offered.items() if found.present or found.complete}
+        why = {name: _unfit(found, size) for name, found in present.items()}
+        fit = [name for name, reason in why.items() if not reason]
+        if not fit:
+            raise _no_match(spec, hits, why)
+        left_out += [f"{name}: {reason}" for name, reason in why.items() if reason]
+        names |= {str(Spec(name, spec.options)): None for name in fit}
+    return Selection(tuple(names), tuple(left_out))
+
+
+def _unfit(listing: Listing, size: str | None) -> str:
+    """Why a scene cannot be compared in that size; empty if it can."""
+    if not listing.truth:
+        return _NO_TRUTH
+    if size is None or listing.complete is None:
+        return "" if listing.present else "not complete"
+    if size not in listing.sizes:
+        return f"no size {size}"
+    return "" if size in listing.complete else f"not there in size {size}"
+
+
+def _no_match(spec: Spec, hits: Sequence[str], unfit: Mapping[str, str]) -> UserError:
+    """The error for a pattern that means no scene that can be compared; `unfit` says why of those present."""
+    if not hits:
+        return UserError(f"no scene {spec.name!r} exists: see 'matbench list'")
+    which = f"{len(hits)} scenes that {spec.name!r} matches"
+    if unfit:
+        which += f": none can be compared ({', '.join(f'{name}: {reason}' for name, reason in unfit.items())})"
+        if set(unfit.values()) == {_NO_TRUTH}:
+            return UserError(f"{which}: see 'matbench list'")
+    else:
+        which += " are known but not under the data folder"
+    size = {key: value for key, value in spec.options.items() if key == "size"}
+    fetch = shlex.join(["matbench", "fetch", str(Spec(spec.name, size))])
+    return UserError(f"{which}: give the data folder by --data or {DATA_VARIABLE}, or bring them with {fetch}")
 
 
 def load_scene(name: str, data: str | Path | None = None) -> Scene:
@@ -89,7 +153,7 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     name
         ``dataset/scene``, options in brackets; one value for each.
     data
-        The folder of real scenes; without it the one that MATBENCH_DATA names.
+        The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
 
     Raises
     ------

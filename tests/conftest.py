@@ -1,6 +1,11 @@
 """Fixtures for tests of all parts."""
 
 import os
+import tempfile
+import threading
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
@@ -9,6 +14,9 @@ from matbench.plugins import kernel_cache
 
 # numba does not notice changes of what a kernel calls in another file: each state of the code has its own cache
 os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))
+# tests neither find nor touch the scenes of whoever runs them
+_own = tempfile.TemporaryDirectory(prefix="matbench-tests-")
+os.environ["XDG_DATA_HOME"] = _own.name
 
 
 @pytest.fixture(scope="session")
@@ -21,3 +29,128 @@ def data_root() -> Path:
     if not root.is_dir():
         pytest.fail(f"MATBENCH_DATA names {str(root)!r}, which is no folder")
     return root.resolve()
+
+
+class Site:
+    """A web server on this machine with whatever faults a test asks for.
+
+    Attributes
+    ----------
+    files
+        Path -> content; `folder` holds further files.
+    faults
+        Path -> what happens to the next requests, one fault each, the last one again and again if
+        it is in `forever`: an int is a status; ``("cut", n)`` breaks off after n bytes of the reply;
+        ``("stall", n)`` says nothing more after n bytes; ``("slow", n, s)`` waits s seconds before
+        each further kibibyte after n bytes; ``("headers", {...})`` replaces what is said of the body.
+    moved
+        Path -> where it is redirected to.
+    ranges
+        Does it send parts of files when it is asked to?
+    requests
+        (path, Range header or None, bytes of body sent) of every request, in order.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = folder
+        self.files: dict[str, bytes] = {}
+        self.faults: defaultdict[str, list[object]] = defaultdict(list)
+        self.forever: set[str] = set()
+        self.ranges = True
+        self.moved: dict[str, str] = {}
+        self.requests: list[list[object]] = []
+        self.released = threading.Event()
+        site = self
+
+        class Handler(BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                site.answer(self)
+
+            def log_message(self, *_: object) -> None:
+                pass
+
+        self.server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.server.daemon_threads = True
+        threading.Thread(target=self.server.serve_forever, args=(0.05,), daemon=True).start()
+        self.url = f"http://127.0.0.1:{self.server.server_port}/"
+
+    def close(self) -> None:
+        self.released.set()
+        self.server.shutdown()
+        self.server.server_close()
+
+    def sent(self, path: str) -> list[tuple[object, ...]]:
+        return [tuple(rest) for name, *rest in self.requests if name == path]
+
+    def _content(self, path: str) -> bytes | None:
+        if path in self.files:
+            return self.files[path]
+        if self.folder is not None and (self.folder / path).is_file():
+            return (self.folder / path).read_bytes()
+        return None
+
+    def answer(self, to: BaseHTTPRequestHandler) -> None:
+        path = to.path.lstrip("/")
+        asked = to.headers.get("Range")
+        entry: list[object] = [path, asked, 0]
+        self.requests.append(entry)
+        faults = self.faults[path]
+        fault = None if not faults else faults[0] if len(faults) == 1 and path in self.forever else faults.pop(0)
+        content = self._content(path)
+        status = fault if isinstance(fault, int) else 200 if content is not None else 404
+        body, headers = b"" if status >= 300 or content is None else content, {}
+        if asked and status == 200 and self.ranges:
+            first = int(asked.removeprefix("bytes=").rstrip("-"))
+            if first >= len(body):
+                status, headers, body = 416, {"Content-Range": f"bytes */{len(body)}"}, b""
+            else:
+                status, headers = 206, {"Content-Range": f"bytes {first}-{len(body) - 1}/{len(body)}"}
+                body = body[first:]
+        if path in self.moved:
+            status, headers = 302, {"Location": self.moved[path]}
+        headers["Content-Length"] = str(len(body))
+        kind, *rest = fault if isinstance(fault, tuple) else (None,)
+        if kind == "headers":
+            headers |= rest[0]
+        to.send_response(status)
+        for name, value in headers.items():
+            if value is not None:
+                to.send_header(name, value)
+        to.end_headers()
+        try:
+            whole = rest[0] if kind in ("cut", "stall", "slow") else len(body)
+            to.wfile.write(body[:whole])
+            to.wfile.flush()
+            entry[2] = min(whole, len(body))
+            if kind == "stall":
+                self.released.wait(60)
+            if kind == "slow":
+                for at in range(whole, len(body), 1024):
+                    if self.released.wait(rest[1]):
+                        return
+                    to.wfile.write(body[at : at + 1024])
+                    to.wfile.flush()
+                    entry[2] = min(at + 1024, len(body))
+        except OSError:  # the other side has gone
+            pass
+        to.close_connection = True
+
+
+@pytest.fixture
+def serve() -> Iterator[Callable[..., Site]]:
+    """Start web servers that end with the test."""
+    sites: list[Site] = []
+
+    def start(folder: Path | None = None) -> Site:
+        sites.append(Site(folder))
+        return sites[-1]
+
+    yield start
+    for site in sites:
+        site.close()
+
+
+@pytest.fixture
+def site(serve: Callable[..., Site]) -> Site:
+    """One web server, empty."""
+    return serve()

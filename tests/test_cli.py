@@ -99,7 +99,7 @@ def test_missing_real_scenes_are_one_line(
     status, out, _ = run(capsys, *line)
     assert status == 0
     first = out.splitlines()[0]
-    assert all(name in first for name in ("tsukuba", "Rocks1", "teddy", "--data"))
+    assert all(name in first for name in ("tsukuba", "Rocks1", "teddy", "--data", "matbench fetch paper"))
 
 
 def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,6 +113,8 @@ def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
     assert "paper" in known["algorithms"]["materiality"]["presets"]
     assert known["scenes"]["middlebury2003/teddy"]["sizes"]["quarter"] == [450, 375]
     assert known["scenes"]["synthetic/box"]["present"] is True
+    truths = {name: known["scenes"][f"middlebury2005/{name}"]["truth"] for name in ("Art", "Computer", "Drumsticks")}
+    assert truths == {"Art": True, "Computer": False, "Drumsticks": False}
     assert known["metrics"]["total_bad_1"]["unit"] == "%"
     status, out, _ = run(capsys, "list")
     assert status == 0
@@ -190,10 +192,11 @@ def test_help_is_quick_and_imports_nothing_heavy() -> None:
         said = subprocess.run([sys.executable, "-m", "matbench", "--help"], capture_output=True, text=True, check=True)
         best = min(best, time.perf_counter() - start)
     assert "compare" in said.stdout
+    assert "Download scenes" in said.stdout, "a command that is imported late has its line, too"
     assert best < 0.5
 
 
-@pytest.mark.parametrize("command", ["compare", "ablate", "list", "view"])
+@pytest.mark.parametrize("command", ["compare", "ablate", "fetch", "list", "view"])
 def test_help_teaches_by_example(capsys: pytest.CaptureFixture[str], command: str) -> None:
     status, out, _ = run(capsys, command, "--help")
     assert status == 0

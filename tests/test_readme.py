@@ -63,9 +63,12 @@ def test_the_lines_on_real_scenes_are_understood(line: str, data_root: Path, tmp
 
 @pytest.mark.parametrize("line", [line for line in LINES if "--data" not in line and "mine.py" not in line])
 def test_the_other_lines_name_what_exists(line: str, tmp_path: Path) -> None:
-    from matbench import comparison
+    from matbench import comparison, downloads
 
     tokens = shlex.split(line)
+    if tokens[1] == "fetch":
+        assert downloads.downloads(tokens[2:])[0]
+        return
     if tokens[1] != "compare":
         assert tokens[1] in ("list", "view")
         return

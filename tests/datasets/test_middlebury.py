@@ -61,9 +61,9 @@ def _refused(dataset: Middlebury, name: str, root: Path | None, *words: str, **o
         (MIDDLEBURY_2001, "venus", None, "0 1 2 3 4 5 6 7 8", "2", 4, 19 / 4, 100 / 32),
         (MIDDLEBURY_2003, "teddy", None, "0 1 2 3 4 5 6 7 8", "2", 4, 59 / 4, 100 / 16),
         (MIDDLEBURY_2003, "teddy", "half", "2 3 4 5 6", "2", 4, 118 / 4, 100 / 8),
-        (MIDDLEBURY_2006, "Aloe", None, "0 1 2 3 4 5 6", "1", 4, 48 / 4, 100 / 12),
-        (MIDDLEBURY_2006, "Aloe", "half", "0 1 2 3 4 5 6", "1", 4, 64 / 4, 100 / 8),
-        (MIDDLEBURY_2005, "Art", None, "0 1 2 3 4 5 6", "1", 4, 64 / 4, 100 / 8),
+        (MIDDLEBURY_2006, "Aloe", None, "0 1 2 3 4 5 6", "1", 4, 80 / 4, 100 / 12),
+        (MIDDLEBURY_2006, "Aloe", "half", "0 1 2 3 4 5 6", "1", 4, 112 / 4, 100 / 8),
+        (MIDDLEBURY_2005, "Art", None, "0 1 2 3 4 5 6", "1", 4, 112 / 4, 100 / 8),
     ],
 )
 def test_every_layout(site: Path, dataset, name, size, labels, ref, pair, largest, disparity) -> None:
@@ -145,13 +145,27 @@ def test_known_but_absent_scenes_say_where_and_what_there_is(site: Path) -> None
     _refused(MIDDLEBURY_2003, "cones", site, "middlebury2003/cones", str(site), "present: teddy")
     _refused(MIDDLEBURY_2003, "cones", None, "middlebury2003/cones", "--data", "MATBENCH_DATA")
     _refused(MIDDLEBURY_2005, "Art", site, "size full", "present: size half", size="full")
-    _refused(MIDDLEBURY_2005, "Computer", site, "middlebury2005/Computer", "no ground truth")
+    _refused(MIDDLEBURY_2005, "Art", site, "matbench fetch 'middlebury2005/Art[size=full]' brings it", size="full")
+    _refused(MIDDLEBURY_2003, "cones", site, "matbench fetch middlebury2003/cones brings it")
+    _refused(MIDDLEBURY_2005, "Drumsticks", site, "no file of it is known")
+    for name in ("disp1.png", "disp5.png"):
+        (site / "middlebury/scenes2005/HalfSize/Art" / name).unlink()
+    _refused(MIDDLEBURY_2005, "Art", site, "middlebury2005/Art", "no ground truth")
+
+
+def test_a_scene_whose_truth_was_never_published_is_views_only(site: Path) -> None:
+    scene = MIDDLEBURY_2005.load("Computer", {}, site)
+    assert (scene.n, scene.labels[scene.ref], scene.pair_steps) == (7, "1", 4)
+    assert (dict(scene.truth), dict(scene.regions)) == ({}, {})
+    assert scene.disparities.largest == 240 / 4, "as far as any scene of its year and size"
+    assert MIDDLEBURY_2005.load("Computer", {"views": "2:7:2", "ref": "4"}, site).labels == ("2", "4", "6")
 
 
 def test_a_scene_that_only_the_folder_knows(site: Path) -> None:
     scene = MIDDLEBURY_2005.load("My_own", {}, site)
     assert scene.labels[scene.ref] == "5"
     assert scene.regions["occ"][5, -1], "its partner is to the left"
+    assert scene.disparities.largest == 64 / 4, "50 px of the pair, rounded up to a multiple of 16"
 
 
 def test_damaged_files_are_named(site: Path) -> None:
@@ -174,7 +188,12 @@ def test_listings_know_what_is_absent(site: Path) -> None:
     assert absent["teddy"].sizes == {"quarter": (450, 375), "half": (900, 750)}
     here = {listing.name: listing for listing in MIDDLEBURY_2005.listings(site)}
     assert here["Art"].present
-    assert not here["Computer"].present, "it has no truth"
+    assert here["Computer"].present
+    assert not here["Computer"].truth
+    assert here["Art"].truth
+    assert here["Art"].complete == {"half"}
+    assert here["Drumsticks"].sizes == {}
+    assert not here["Drumsticks"].present
     assert here["My_own"].sizes == {"half": (WIDTH, HEIGHT)}
     assert not here["Moebius"].present
     (site / "middlebury/scenes2003/newdata/teddy/im7.png").unlink()

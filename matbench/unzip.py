@@ -1,0 +1,100 @@
+"""Wanted members of a zip archive from elsewhere: by their names, never to where the archive says.
+
+What an archive claims of sizes is not believed: no more is unpacked than was asked for, and the
+names on disk are the caller's own. Links, folders, encrypted members, and members with absolute
+paths or ``..`` in them are passed over.
+"""
+
+import stat
+import struct
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile, ZipInfo
+
+CHUNK = 1 << 16
+RATIO = 200
+"""Most bytes out of one byte in, above a mebibyte: pictures stay far below."""
+_FREE = 1 << 20
+_ENCRYPTED = 0x1
+_DAMAGED = (BadZipFile, zlib.error, struct.error, EOFError, OSError, OverflowError, RuntimeError, ValueError)
+
+
+class ArchiveError(Exception):
+    """An archive, or a member of one, that cannot be used, and why, in one line."""
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[ZipFile]:
+    """An archive to read.
+
+    Raises
+    ------
+    ArchiveError
+        If it is none, or is damaged.
+    """
+    try:
+        archive = ZipFile(path)
+    except _DAMAGED as error:
+        raise ArchiveError(f"no zip archive: {error}") from error
+    with archive:
+        yield archive
+
+
+def members(archive: ZipFile, names: Sequence[str]) -> list[ZipInfo]:
+    """The safe members with one of these file names, whatever folder they lie in.
+
+    There may be several of a name; the caller judges them by their content. Those in fewer folders
+    come first, then in the order of `names`.
+    """
+    found = [info for info in archive.infolist() if _path(info).name in names and _is_safe(info)]
+    return sorted(found, key=lambda info: (len(_path(info).parts), names.index(_path(info).name)))
+
+
+def unpack(archive: ZipFile, info: ZipInfo, target: Path, limit: int) -> int:
+    """Write a member to a new file `target`; how many bytes.
+
+    Raises
+    ------
+    ArchiveError
+        If it is damaged, or unpacks to more than `limit` bytes or `RATIO` times its packed size.
+    OSError
+        If `target` cannot be written.
+    """
+    limit = min(limit, max(_FREE, RATIO * info.compress_size))
+    count = 0
+    with target.open("xb") as file:
+        for chunk in _chunks(archive, info):
+            count += len(chunk)
+            if count > limit:
+                raise ArchiveError(f"{info.filename} unpacks to more than {limit} bytes: that cannot be right")
+            file.write(chunk)
+    return count
+
+
+def _chunks(archive: ZipFile, info: ZipInfo) -> Iterator[bytes]:
+    try:
+        with archive.open(info) as member:
+            while chunk := member.read(CHUNK):
+                yield chunk
+    except _DAMAGED as error:
+        raise ArchiveError(f"{info.filename} is damaged: {error}") from error
+
+
+def _path(info: ZipInfo) -> PurePosixPath:
+    return PurePosixPath(info.filename)
+
+
+def _is_safe(info: ZipInfo) -> bool:
+    path, mode = _path(info), info.external_attr >> 16
+    return (
+        not info.is_dir()
+        and not path.is_absolute()
+        and ".." not in path.parts
+        and "\\" not in info.filename
+        and ":" not in info.filename
+        and stat.S_IFMT(mode) in (0, stat.S_IFREG)
+        and not info.flag_bits & _ENCRYPTED
+        and info.compress_type in (ZIP_STORED, ZIP_DEFLATED)
+    )
