@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.dataset import Listing
-from matbench.datasets.choose import reference, view_indices
+from matbench.datasets.choose import search_range, views_and_reference
 from matbench.datasets.images import read_grey, read_rgb, read_size
 from matbench.errors import UserError, unknown
 from matbench.regions import regions
 from matbench.scene import Range, Scene
 
-OPTIONS = ("ref", "size", "views")
+OPTIONS = ("baseline", "disparities", "ref", "size", "views")
 
 _EXTENSIONS = (".png", ".ppm", ".pgm")
 _PREFIXES = ("im", "view")
@@ -141,7 +141,7 @@ class Middlebury:
         return Listing(name, len(layout.numbers), sizes, complete)
 
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:
-        """Load a scene; options are `size`, `views` and `ref`.
+        """Load a scene; options are `size`, `views`, `baseline`, `ref` and `disparities`.
 
         Only the chosen views are read, and the truth of every view that has it.
         """
@@ -151,12 +151,12 @@ class Middlebury:
                 raise unknown(f"option of {called}", option, OPTIONS)
         folder, layout = self._locate(called, name, options.get("size"), root)
         labels = [layout.label.format(number) for number in layout.numbers]
-        chosen = view_indices(called, labels, options.get("views"), _PREFIXES)
+        searched = search_range(called, options.get("disparities"), layout.steps)
         have = [number for number in layout.with_truth if _find(folder, layout.truth.format(number))]
         if not have:
             raise UserError(f"{called} has no ground truth in {folder}: a scene without it cannot be scored")
         indices = [layout.numbers.index(number) for number in have]
-        ref = reference(called, labels, indices, chosen, options.get("ref"), _PREFIXES)
+        chosen, ref = views_and_reference(called, labels, indices, options, _PREFIXES)
 
         images = {ref: read_rgb(_found(folder, layout.view.format(layout.numbers[ref])))}
         height, width = images[ref].shape[:2]
@@ -173,7 +173,7 @@ class Middlebury:
             views=views,
             labels=tuple(labels),
             ref=ref,
-            disparities=Range(0, self._largest(layout, truth.values()) / layout.steps),
+            disparities=searched or Range(0, self._largest(layout, truth.values()) / layout.steps),
             truth=truth,
             pair_steps=layout.steps,
             regions=regions(images[ref], truth[ref], other),
