@@ -10,7 +10,11 @@ FARTHEST = 9999  # px of the pair, either way
 
 
 def views_and_reference(
-    scene: str, labels: Sequence[str], preferred: Sequence[int], options: Mapping[str, str], prefixes: Sequence[str] = ()
+    scene: str,
+    labels: Sequence[str],
+    preferred: Sequence[int],
+    options: Mapping[str, str],
+    prefixes: Sequence[str] = (),
 ) -> tuple[list[int], int]:
     """Indices of the views that the options `views` and `baseline` ask for, and of the reference view.
 

@@ -14,17 +14,19 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench import plugins, run, scoring
+from matbench import plugins, run, scoring, spec
 from matbench._version import __version__
 from matbench.dataset import Listing
 from matbench.errors import UserError, unknown
 from matbench.plan import Plan, make_plan, methods
-from matbench.scene import Scene
-from matbench.scenes import data_root, listings, load_scene, select
+from matbench.scene import NotInScene, Scene
+from matbench.scenes import data_root, is_pattern, listings, load_scene, select
 from matbench.store import Store, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from matbench.sweeps import Sweep
 
 PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
 RUNS = Path("runs")
@@ -42,6 +44,10 @@ class Comparison:
         Write a recording of every cell.
     command
         The line that asked for it, for the report.
+    row
+        The image row that recordings show; the middle one of each scene if None.
+    left_out
+        Scenes that a pattern matches but that have not the views asked for.
     """
 
     plan: Plan
@@ -50,6 +56,8 @@ class Comparison:
     data: Path | None
     record: bool
     command: str
+    row: int | None = None
+    left_out: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -61,7 +69,7 @@ class Comparison:
         found = plugins.algorithms([Path(file) for file in self.plan.plugin_files])
         entries = [found[name].entry for name in sorted(names)]
         preload = [entry.module for entry in entries if not isinstance(entry, type)]
-        run.run(self.plan, self.store, data=self.data, record=self.record, preload=preload, listen=listen)
+        run.run(self.plan, self.store, data=self.data, record=self.record, row=self.row, preload=preload, listen=listen)
 
     def tables(self) -> "tuple[pd.DataFrame, pd.DataFrame]":
         """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
@@ -70,6 +78,15 @@ class Comparison:
         for name, table in (("results.csv", results), ("cells.csv", cells)):
             write_text(self.folder / name, table.to_csv(index=False))
         return results, cells
+
+    def sweeps(self, results: "pd.DataFrame") -> "list[Sweep]":
+        """The curves of whatever takes several numbers; written as ``sweeps.csv`` if there are any."""
+        from matbench.sweeps import sweeps, table
+
+        found = sweeps(self.plan, results)
+        if found:
+            write_text(self.folder / "sweeps.csv", table(found).to_csv(index=False))
+        return found
 
     def ablation(self, results: "pd.DataFrame") -> "pd.DataFrame":
         """What each factor does; written as ``ablation.csv`` and ``ablation.tex``, too."""
@@ -81,7 +98,13 @@ class Comparison:
         write_text(self.folder / "ablation.tex", switches.latex(table))
         return table
 
-    def report(self, results: "pd.DataFrame", cells: "pd.DataFrame", ablation: "pd.DataFrame | None" = None) -> Path:
+    def report(
+        self,
+        results: "pd.DataFrame",
+        cells: "pd.DataFrame",
+        ablation: "pd.DataFrame | None" = None,
+        sweeps: "Sequence[Sweep]" = (),
+    ) -> Path:
         """Write ``report.html``."""
         from matbench.reports import page
 
@@ -106,6 +129,7 @@ class Comparison:
                 scenes=self.scenes,
                 facts=machine(),
                 ablation=ablation,
+                sweeps=tuple(sweeps),
                 higher=frozenset(m.name for m in scoring.metrics() if m.better == "higher"),
             ),
         )
@@ -192,6 +216,7 @@ def prepare(
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     command: str | None = None,
+    row: int | None = None,
 ) -> Comparison:
     """Check everything that was asked for, read every scene, and only then write the plan.
 
@@ -205,18 +230,32 @@ def prepare(
     names = select(scenes, root) if scenes is not None else default_scenes(root)[0]
     if not chosen or not names:
         raise UserError("nothing to compare: name at least one algorithm and one scene")
+    named = {str(one) for one in spec.expand(scenes or names) if not is_pattern(one.name)}
     loaded: dict[tuple[str, str], Scene] = {}  # a scene spelled in two ways is one scene
+    spellings, left_out = {}, []
     for name in names:
-        scene = load_scene(name, root)
+        try:
+            scene = load_scene(name, root)
+        except NotInScene:
+            if name in named:
+                raise
+            left_out.append(name)
+            continue
         if scene.ref not in scene.truth:
             raise UserError(f"{name} has no ground truth of its reference view {scene.labels[scene.ref]}: no scores")
-        loaded.setdefault((scene.digest, scene.truth_digest), scene)
+        if row is not None and not 0 <= row < scene.height:
+            raise UserError(f"row {row} of {name}: 0 to {scene.height - 1} is possible")
+        kept = loaded.setdefault((scene.digest, scene.truth_digest), scene)
+        if kept.name != scene.name:
+            spellings[scene.name] = kept.name
+    if not loaded:
+        raise UserError(f"no scene has the views asked for: {', '.join(left_out)}")
     by_name = {scene.name: scene for scene in loaded.values()}
-    plan = make_plan(chosen, by_name, seeds, files)
+    plan = make_plan(chosen, by_name, seeds, files, spellings)
     folder = Path(out) if out is not None else RUNS / plan.digest
     store = Store.open(folder, plan)
     said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
-    return Comparison(plan, store, by_name, root, record, said)
+    return Comparison(plan, store, by_name, root, record, said, row, tuple(left_out))
 
 
 def compare(
@@ -228,6 +267,7 @@ def compare(
     record: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
+    row: int | None = None,
 ) -> "pd.DataFrame":
     """Run methods on scenes and score them; the run folder stays for `matbench view` and the report.
 
@@ -250,6 +290,8 @@ def compare(
         One seed or several.
     plugin
         Python files that hold further methods.
+    row
+        The image row whose epipolar slices recordings show; the middle one if not given.
 
     Returns
     -------
@@ -270,8 +312,9 @@ def compare(
         seed=seed,
         plugin=plugin,
         command="matbench.compare(...)",
+        row=row,
     )
     comparison.run()
     results, cells = comparison.tables()
-    comparison.report(results, cells)
+    comparison.report(results, cells, sweeps=comparison.sweeps(results))
     return results

@@ -55,6 +55,11 @@ def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
     return found
 
 
+def is_pattern(name: str) -> bool:
+    """Does a name stand for all scenes that it matches?"""
+    return re.search(r"[*?]", name) is not None
+
+
 def select(selectors: str | Iterable[str], data: str | Path | None = None) -> list[str]:
     """The names of the scenes that selectors mean; patterns match scenes that are present.
 
@@ -65,7 +70,7 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> li
     """
     names: dict[str, None] = {}
     for spec in expand(selectors):
-        if not re.search(r"[*?]", spec.name):
+        if not is_pattern(spec.name):
             names[str(spec)] = None
             continue
         known = listings(data)

@@ -7,6 +7,7 @@ that no point of a curve is a mean over easier scenes than another.
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
+from math import isfinite, nan
 
 import numpy as np
 import pandas as pd
@@ -77,7 +78,7 @@ class Sweep:
     scenes: tuple[str, ...]
     left_out: tuple[str, ...]
     moving: tuple[str, ...]
-    limits: Mapping[str, int]
+    limits: Mapping[str, float]
     curves: pd.DataFrame
 
 
@@ -86,7 +87,7 @@ def is_swept(scenes: Iterable[Spec]) -> bool:
     values: dict[tuple[str, str], set[float]] = {}
     for scene in scenes:
         for option, text in scene.options.items():
-            if option not in REPEATS and (number := _number(text)) is not None:
+            if option not in REPEATS and isfinite(number := _number(text)):
                 values.setdefault((scene.name, option), set()).add(number)
     return any(len(found) >= LEAST_VALUES for found in values.values())
 
@@ -135,11 +136,9 @@ def sweeps(plan: Plan, results: pd.DataFrame) -> list[Sweep]:
     return found
 
 
-def _number(value: object) -> float | None:
-    """The number that an option's text or a parameter's value is, or None."""
-    if isinstance(value, bool) or value is None:
-        return None
-    return float(str(value)) if re.fullmatch(r"-?[0-9]{1,9}(\.[0-9]+)?(e-?[0-9]{1,2})?", str(value)) else None
+def _number(value: object) -> float:
+    """The number that an option's text or a parameter's value is; NaN if it is none."""
+    return float(str(value)) if re.fullmatch(r"-?[0-9]{1,9}(\.[0-9]+)?(e-?[0-9]{1,2})?", str(value)) else nan
 
 
 def _cells(plan: Plan) -> pd.DataFrame:
@@ -175,7 +174,7 @@ def _sweeps_of(option: str, of: str, cells: pd.DataFrame, results: pd.DataFrame)
         setting=setting,
         base=[spec.label(base, one) for base, one in zip(cells["base"], fixed, strict=True)],
         repeat=[
-            (spec.text({k: v for k, v in one.items() if k in REPEATS}), seed)
+            f"{spec.text({k: v for k, v in one.items() if k in REPEATS})} {seed}"
             for one, seed in zip(rest, cells["seed"], strict=True)
         ],
     ).dropna(subset="value")
@@ -218,10 +217,10 @@ def _moving(good: pd.DataFrame) -> tuple[str, ...]:
     return tuple(dict.fromkeys(str(region) for region, *_ in counts.index[counts > 1]))
 
 
-def _limits(methods: Iterable[Method], option: str, largest: float) -> dict[str, int]:
+def _limits(methods: Iterable[Method], option: str, largest: float) -> dict[str, float]:
     """The methods whose own parameter of that name is set to less."""
     own = {str(method): _number(method.params.get(option)) for method in methods}
-    return {name: int(limit) for name, limit in own.items() if limit is not None and 0 < limit < largest}
+    return {name: limit for name, limit in own.items() if 0 < limit < largest}
 
 
 def _without(method: Method, option: str) -> str:
@@ -250,13 +249,13 @@ def _lines(scores: pd.DataFrame) -> list[tuple[object, ...]]:
     """What `COLUMNS` say from `mean` on, for each row of (curve and value) x scenes."""
     numbers, count = scores.to_numpy(np.float64), scores.shape[1]
     changes = numbers - scores.groupby("curve", sort=False).transform("first").to_numpy(np.float64)
-    nothing = np.full((2, 2 * len(scores)), np.nan)
+    nothing = np.full((2, 2 * len(scores)), nan)
     low, high = intervals(np.concatenate([numbers, changes])) if count >= FEW else nothing
     means, shifts = numbers.mean(axis=1), changes.mean(axis=1)
     (low, least), (high, most) = np.split(low, 2), np.split(high, 2)
     first = scores.index.get_level_values("value") == scores.index.get_level_values("value").min()
     verdicts = [
-        "" if is_first else Effect(*shift, np.nan, count).verdict
-        for is_first, *shift in zip(first, shifts, least, most, strict=True)
+        "" if is_first else Effect(mean, lower, upper, nan, count).verdict
+        for is_first, mean, lower, upper in zip(first, shifts, least, most, strict=True)
     ]
     return list(zip(means, low, high, shifts, least, most, [count] * len(scores), verdicts, strict=True))
