@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WORDS = {
-    "baseline": "baseline, view steps",
+    "baseline": "baseline (view steps)",
     "n": "number of views",
-    "noise": "noise, grey levels",
+    "noise": "noise (grey levels)",
     "views": "number of views",
 }
 IN_TERMINAL = ("nonocc", "all", "occ")
@@ -35,9 +35,10 @@ _ACROSS = 3  # panels side by side
 
 
 def title(sweep: Sweep) -> str:
-    """What is swept, and the setting of the scenes' other options."""
-    what = f"{sweep.of}: {sweep.option}" if sweep.of else WORDS.get(sweep.option, sweep.option)
-    return f"{what} ({sweep.setting})" if sweep.setting else what
+    """What is swept and how far, and the setting of the scenes' other options."""
+    what = f"{sweep.option} of {sweep.of}" if sweep.of else WORDS.get(sweep.option, sweep.option)
+    what += f", {sweep.values[0]:g} to {sweep.values[-1]:g}"
+    return f"{what}, scenes with {sweep.setting}" if sweep.setting else what
 
 
 def caption(sweep: Sweep, metric: str = METRIC) -> str:
@@ -55,9 +56,9 @@ def caption(sweep: Sweep, metric: str = METRIC) -> str:
     moving = [region for region in sweep.moving if region in set(sweep.curves["region"])]
     if moving:
         said.append(f"Not the same pixels at every value: {', '.join(moving)}.")
-    said += [
-        f"{name} uses at most {limit:g}, its own parameter {sweep.option}." for name, limit in sweep.limits.items()
-    ]
+    if sweep.limits:
+        own = ", ".join(f"{name} {limit:g}" for name, limit in sweep.limits.items())
+        said.append(f"Held by a parameter {sweep.option} of their own to: {own}.")
     return " ".join(said)
 
 
@@ -135,7 +136,7 @@ def figure(sweep: Sweep, metric: str = METRIC) -> "Figure | None":
         if place % across == 0:
             axes.set_ylabel(f"{metric}, {here['unit'].iloc[0]}" if here["unit"].iloc[0] else metric, color=INK)
         if place + across >= len(names):
-            axes.set_xlabel(WORDS.get(sweep.option, sweep.option), color=INK)
+            axes.set_xlabel(sweep.option if sweep.of else WORDS.get(sweep.option, sweep.option), color=INK)
     drawn.draw_without_rendering()
     for row in grid:
         last = [axes for axes in row if axes.axison][-1]
@@ -177,19 +178,19 @@ def _name_curves(axes: "Axes", methods: Sequence[str], beside_nothing: bool) -> 
     below = -np.inf
     for height, end, colour, name in sorted(ends, key=lambda one: one[0]):
         broken = name.replace("[", "\n[", 1)
-        room = 10.5 * (broken.count("\n") + 1)
+        room = 13 * (broken.count("\n") + 1)
         middle = max(height * step, below + room / 2)
         below = middle + room / 2
         axes.annotate(
             broken,
             end,
-            (9, middle - height * step),
+            (14, middle - height * step),
             textcoords="offset points",
             va="center",
             fontsize=8,
-            linespacing=1.05,
+            linespacing=1.3,
             color=INK,
             parse_math=False,
             annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": colour, "lw": 1.2, "shrinkA": 0, "shrinkB": 3},
+            arrowprops={"arrowstyle": "-", "color": colour, "lw": 1, "shrinkA": 1, "shrinkB": 3, "relpos": (0, 0.5)},
         ).set_in_layout(beside_nothing)
