@@ -230,25 +230,28 @@ def _without(method: Method, option: str) -> str:
 
 def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
     """The means of every curve and value over the scenes that have all of them."""
-    groups = good.groupby(["region", "metric", "unit", "curve", "value", "base"], sort=False)["score"]
-    per_scene = groups.mean().where(groups.count() == groups.size()).unstack("base")
+    heads = ["region", "metric", "unit"]
+    groups = good.groupby([*heads, "curve", "value", "base"], sort=False)["score"]
+    per_scene = groups.mean().where(groups.count() == groups.size()).unstack("base").sort_index(level="value")
+    has = per_scene.notna().groupby(heads).transform("all")
     rows: list[tuple[object, ...]] = []
-    for head, wide in per_scene.groupby(["region", "metric", "unit"], sort=False):
-        known = wide.droplevel([0, 1, 2]).dropna(axis=1)
-        if not known.shape[1]:  # an empty region
-            continue
-        known = known.sort_index(level="value", sort_remaining=False)
-        for (curve, value), line in zip(known.index, _lines(known), strict=True):
-            rows.append((*labels[str(curve)], value, *head, *line))
-    order = {label: place for place, label in enumerate(labels.values())}
-    rows.sort(key=lambda row: order[row[:2]])  # type: ignore[index]
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    for known in set(map(tuple, has.to_numpy().tolist())):  # at most a few: all at once is much faster
+        part = per_scene.loc[(has == list(known)).all(axis=1), list(known)]
+        if part.shape[1]:  # else the region is empty
+            for (*head, curve, value), line in zip(part.index, _lines(part), strict=True):
+                rows.append((*labels[str(curve)], value, *head, *line))
+    found = pd.DataFrame(rows, columns=list(COLUMNS))
+    places = {"algorithm": [a for a, _ in labels.values()], "params": [p for _, p in labels.values()]}
+    places |= {name: list(good[name].unique()) for name in ("region", "metric")}
+    order = [found[name].map(list(dict.fromkeys(places[name])).index) for name in places]
+    return found.iloc[np.lexsort([found["value"], *order[::-1]])].reset_index(drop=True)
 
 
 def _lines(scores: pd.DataFrame) -> list[tuple[object, ...]]:
-    """What `COLUMNS` say from `mean` on, for each row of (curve and value) x scenes."""
+    """What `COLUMNS` say from `mean` on, for each row of curves by increasing values x scenes."""
     numbers, count = scores.to_numpy(np.float64), scores.shape[1]
-    changes = numbers - scores.groupby("curve", sort=False).transform("first").to_numpy(np.float64)
+    curves = scores.groupby(["region", "metric", "unit", "curve"], sort=False)
+    changes = numbers - curves.transform("first").to_numpy(np.float64)
     nothing = np.full((2, 2 * len(scores)), nan)
     low, high = intervals(np.concatenate([numbers, changes])) if count >= FEW else nothing
     means, shifts = numbers.mean(axis=1), changes.mean(axis=1)

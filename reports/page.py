@@ -95,7 +95,8 @@ def _answer(rows: pd.DataFrame, scope: Shared) -> dict[str, Any]:
         "next_score": shown[rest[0]] if rest else "",
         "compared": len(shown),
         "scenes": len(scope.scenes),
-        "few": len(scope.scenes) < FEW,
+        "distinct": scope.distinct,
+        "few": scope.distinct < FEW,
         "unranked": [str(m) for m in rows.index[~rows["ranked"]]],
     }
 
