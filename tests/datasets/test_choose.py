@@ -1,6 +1,10 @@
 """Choosing views by their labels."""
 
+from contextlib import suppress
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from matbench.datasets.choose import reference, search_range, view_indices, views_and_reference
 from matbench.errors import UserError
@@ -150,3 +154,18 @@ def test_the_range_to_search_is_given_in_pixels_of_the_pair() -> None:
 def test_ranges_that_cannot_be_are_refused(text: str) -> None:
     with pytest.raises(UserError, match="LEAST:LARGEST in pixels of the pair"):
         search_range("s", text, 1)
+
+
+_TYPED = st.text(alphabet="0123456789:+-.xcol ", max_size=8) | st.text(max_size=6)
+
+
+@given(st.dictionaries(st.sampled_from(["views", "baseline", "ref"]), _TYPED), _TYPED)
+def test_whatever_is_typed_is_a_choice_or_the_users_error(options: dict[str, str], text: str) -> None:
+    with suppress(UserError):
+        chosen, ref = views_and_reference("s", NINE, [2, 6], options)
+        assert ref in chosen
+        assert len(chosen) >= 2
+    with suppress(UserError):
+        found = search_range("s", text, 4)
+        assert found is not None
+        assert found.least < found.largest
