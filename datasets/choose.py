@@ -1,9 +1,96 @@
-"""Choosing views and the reference view of a scene by their labels."""
+"""Choosing from a scene: views by number, baseline or label, the reference view, the range to search."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from matbench.errors import UserError, unknown
+from matbench.scene import NotInScene, Range, evenly_spaced
+
+FARTHEST = 9999  # px of the pair, either way
+
+
+def views_and_reference(
+    scene: str,
+    labels: Sequence[str],
+    preferred: Sequence[int],
+    options: Mapping[str, str],
+    prefixes: Sequence[str] = (),
+) -> tuple[list[int], int]:
+    """Indices of the views that the options `views` and `baseline` ask for, and of the reference view.
+
+    ``views=5`` is that many views, evenly spaced, as wide as they fit; ``baseline=4`` all views
+    within four view steps; both together, that many views of which the last is that far from the
+    first. Then the reference view is that of the whole scene whatever the numbers are, so that
+    they can be swept; it need not lie in the middle. Other values of `views` are labels, as in
+    `view_indices`.
+
+    Parameters
+    ----------
+    scene, labels, prefixes
+        As in `view_indices`.
+    preferred
+        As in `reference`; `ref` of the options is its choice.
+
+    Raises
+    ------
+    NotInScene
+        If the scene has not so many views, or not at that baseline.
+    UserError
+        If an option cannot be read, or no view with ground truth is left.
+    """
+    views, wide, ref = (options.get(key) for key in ("views", "baseline", "ref"))
+    counted = views is None or re.fullmatch(r"[0-9]{1,6}", views) is not None
+    if wide is None and not (counted and views):
+        chosen = view_indices(scene, labels, views, prefixes)
+        return chosen, reference(scene, labels, preferred, chosen, ref, prefixes)
+    if not counted:
+        raise UserError(f"baseline={wide} of {scene} goes with a number of views, such as views=3, not views={views}")
+    if wide is not None and not re.fullmatch(r"[0-9]{1,6}", wide):
+        raise UserError(f"baseline={wide} of {scene}: a whole number of view steps from the first view to the last")
+    n = len(labels)
+    index = reference(scene, labels, preferred, range(n), ref, prefixes)
+    asked = " ".join(f"{key}={value}" for key, value in (("views", views), ("baseline", wide)) if value is not None)
+    baseline = None if wide is None else int(wide)
+    count = int(views) if views is not None else int(wide or 0) + 1
+    if not 2 <= count <= n:
+        possible = f"2 to {n}" if views is not None else f"1 to {n - 1}"
+        raise NotInScene(f"{asked} of {scene}: it has {n} views, {possible} is possible")
+    found = evenly_spaced(n, index, count, baseline)
+    if not found:
+        wider = ", ".join(str(b) for b in range(count - 1, n) if evenly_spaced(n, index, count, b))
+        raise NotInScene(
+            f"{asked} of {scene}: for {count} evenly spaced views, {labels[index]} among them, "
+            f"a baseline of {wider} is possible"
+        )
+    return list(found), index
+
+
+def search_range(scene: str, text: str | None, pair_steps: float) -> Range | None:
+    """The range that the option `disparities` asks for, px per view step; None if it is not given.
+
+    Parameters
+    ----------
+    text
+        ``LEAST:LARGEST``, both included, in pixels of the pair: ``0:21``, ``-7.5:10``.
+    pair_steps
+        View steps in the pair.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read, is empty, or reaches beyond `FARTHEST`.
+    """
+    if text is None:
+        return None
+    number = r"-?[0-9]{1,4}(?:\.[0-9]{1,6})?"
+    found = re.fullmatch(f"({number}):({number})", text)
+    least, largest = (float(found[1]), float(found[2])) if found else (0.0, 0.0)
+    if least >= largest:
+        raise UserError(
+            f"disparities={text} of {scene}: LEAST:LARGEST in pixels of the pair, from -{FARTHEST} to {FARTHEST}, "
+            "is possible, such as 0:21"
+        )
+    return Range(least, largest).scaled(1 / pair_steps)
 
 
 def view_indices(scene: str, labels: Sequence[str], choice: str | None, prefixes: Sequence[str] = ()) -> list[int]:

@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.dataset import Download, Listing, Remote
-from matbench.datasets.choose import reference, view_indices
+from matbench.datasets.choose import search_range, views_and_reference
 from matbench.datasets.images import has_pixels, read_grey, read_rgb, read_size
 from matbench.datasets.registry import YEARS, Facts, Layout, Registry, registry, site
 from matbench.errors import UserError, unknown
 from matbench.regions import regions
 from matbench.scene import Range, Scene
 
-OPTIONS = ("ref", "size", "views")
+OPTIONS = ("baseline", "disparities", "ref", "size", "views")
 ROUND_UP = 16  # px of the pair, for ranges that come from the truth itself
 
 _EXTENSIONS = (".png", ".ppm", ".pgm")
@@ -125,7 +125,7 @@ class Middlebury:
         )
 
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:
-        """Load a scene; options are `size`, `views` and `ref`.
+        """Load a scene; options are `size`, `views`, `baseline`, `ref` and `disparities`.
 
         Only the chosen views are read, and the truth of every view that has it.
         """
@@ -136,13 +136,13 @@ class Middlebury:
         folder, size = self._locate(called, name, options.get("size"), root)
         layout, facts = self._layout(name, size), self.known.scenes.get(name, {}).get(size)
         labels = [layout.label.format(number) for number in layout.numbers]
-        chosen = view_indices(called, labels, options.get("views"), _PREFIXES)
+        searched = search_range(called, options.get("disparities"), layout.steps)
         have = [number for number in layout.with_truth if _find(folder, layout.truth.format(number))]
         if not have and not self._lacks_truth(name, size):
             raise UserError(f"{called} has no ground truth in {folder}: a scene without it cannot be scored")
         indices = [layout.numbers.index(number) for number in have]
         preferred = indices or sorted(range(len(labels)), key=lambda i: layout.numbers[i] != layout.pair[0])
-        ref = reference(called, labels, preferred, chosen, options.get("ref"), _PREFIXES)
+        chosen, ref = views_and_reference(called, labels, preferred, options, _PREFIXES)
 
         images = {ref: read_rgb(_found(folder, layout.view.format(layout.numbers[ref])))}
         height, width = images[ref].shape[:2]
@@ -159,7 +159,8 @@ class Middlebury:
             views=views,
             labels=tuple(labels),
             ref=ref,
-            disparities=Range(0, (facts.largest if facts else self._largest(layout, truth.values())) / layout.steps),
+            disparities=searched
+            or Range(0, (facts.largest if facts else self._largest(layout, truth.values())) / layout.steps),
             truth=truth,
             pair_steps=layout.steps,
             regions=regions(images[ref], truth[ref], other) if truth else {},

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.dataset import Listing
-from matbench.datasets.choose import reference, view_indices
+from matbench.datasets.choose import search_range, views_and_reference
 from matbench.datasets.rendering import Column, Paint, Rectangle, Rig, Sphere, Surface, Vector
 from matbench.errors import UserError, unknown
 from matbench.regions import regions
 from matbench.scene import Range, Scene
 
-OPTIONS = ("n", "noise", "ref", "seed", "size", "views")
+OPTIONS = ("baseline", "disparities", "n", "noise", "ref", "seed", "size", "views")
 
 _WIDTH, _HEIGHT, _VIEWS = 240, 180, 5
 _BASELINE = 1 / 40
@@ -172,7 +172,8 @@ class Synthetic:
         """Compute a scene.
 
         Options: `n` views, `size` of a picture, `seed` of textures and noise, `noise` in grey
-        levels (standard deviation), `views` to keep and `ref` to score, by number.
+        levels (standard deviation), `views` and `baseline` to keep, `ref` to score, by number, and
+        `disparities` to search.
         """
         if name not in WORLDS:
             raise unknown("scene of synthetic", name, WORLDS)
@@ -186,12 +187,12 @@ class Synthetic:
         noise = _read_noise(called, options.get("noise", "1"))
 
         labels = [str(view) for view in range(n)]
-        chosen = view_indices(called, labels, options.get("views"))
         from_middle = sorted(range(n), key=lambda view: (abs(view - n // 2), view))
-        ref = reference(called, labels, from_middle, chosen, options.get("ref"))
+        chosen, ref = views_and_reference(called, labels, from_middle, options)
         pair_steps = max(1, n - 1 - n // 2)
         partner = pair_steps if ref + pair_steps < n else -pair_steps
 
+        searched = search_range(called, options.get("disparities"), pair_steps)
         world, scale = WORLDS[name], width / _WIDTH
         rig = Rig(world.build(), n, width, height, width, _BASELINE, world.offset * scale)
         marks = pattern(seed)
@@ -206,7 +207,7 @@ class Synthetic:
             views=views,
             labels=tuple(labels),
             ref=ref,
-            disparities=Range(0 - world.offset, world.largest - world.offset).scaled(scale),
+            disparities=searched or Range(0 - world.offset, world.largest - world.offset).scaled(scale),
             truth=truth,
             pair_steps=pair_steps,
             regions=regions(views[ref], truth[ref], partner, visible[ref][ref + partner]),

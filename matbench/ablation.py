@@ -7,8 +7,9 @@ from attrs import asdict
 
 from matbench.errors import UserError
 from matbench.plan import Method, Plan
-from matbench.spec import Value, text
+from matbench.spec import Value, expand, read_scene, text
 from matbench.statistics import paired_effect
+from matbench.sweeps import is_swept
 
 COLUMNS = (
     "algorithm",
@@ -28,13 +29,7 @@ COLUMNS = (
 
 
 def factors(methods: Sequence[Method]) -> dict[str, dict[str, list[Value]]]:
-    """Algorithm -> parameter -> its values, for each parameter that varies; the first value is the base.
-
-    Raises
-    ------
-    UserError
-        If no parameter of any method takes two values: there is nothing to compare.
-    """
+    """Algorithm -> parameter -> its values, for each parameter that varies; the first value is the base."""
     found: dict[str, dict[str, list[Value]]] = {}
     for method in methods:
         levels = found.setdefault(method.algorithm, {})
@@ -42,20 +37,38 @@ def factors(methods: Sequence[Method]) -> dict[str, dict[str, list[Value]]]:
             known = levels.setdefault(name, [])
             if value not in known:
                 known.append(value)
-    varied = {
+    return {
         algorithm: {name: values for name, values in levels.items() if len(values) > 1}
         for algorithm, levels in found.items()
     }
-    if not any(varied.values()):
-        raise UserError("nothing varies: give a parameter several values, as in 'materiality[pairs=all,consecutive]'")
-    return varied
+
+
+def check_varies(methods: Sequence[Method], scenes: Sequence[str]) -> None:
+    """Refuse a request in which nothing varies.
+
+    Parameters
+    ----------
+    scenes
+        Selectors.
+
+    Raises
+    ------
+    UserError
+        If no parameter of any method takes two values, and no option of a scene enough for a curve.
+    """
+    if not any(factors(methods).values()) and not is_swept(expand(scenes)):
+        raise UserError(
+            "nothing varies: give a parameter several values, as in 'materiality[pairs=all,consecutive]', "
+            "or an option of a scene three numbers or more, as in -s 'synthetic/box[noise=0,4,8]'"
+        )
 
 
 def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
     """The change of every metric and region when one factor goes from its base to another level.
 
     All else is equal within a difference: the other parameters, scene, seed, region. Differences
-    are averaged within a scene, over seeds and the other factors' levels; effects are over scenes.
+    are averaged within a scene, over its options, seeds and the other factors' levels; effects are
+    over scenes.
 
     Parameters
     ----------
@@ -78,7 +91,7 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
                 base, other = text({factor: values[0]}), text({factor: level})
                 if base not in wide or other not in wide:
                     continue
-                change = (wide[other] - wide[base]).groupby(["region", "metric", "unit", "scene"], sort=False).mean()
+                change = (wide[other] - wide[base]).groupby(["region", "metric", "unit", "shown"], sort=False).mean()
                 for (region, metric, unit), over_scenes in change.groupby(["region", "metric", "unit"], sort=False):
                     effect = paired_effect(over_scenes.to_list())
                     numbers = asdict(effect)
@@ -92,5 +105,6 @@ def _levels_side_by_side(results: pd.DataFrame, methods: Mapping[tuple[str, str]
     labels = list(zip(results["algorithm"], results["params"], strict=True))
     level = [text({factor: methods[label].params[factor]}) for label in labels]
     rest = [text({k: v for k, v in methods[label].params.items() if k != factor}) for label in labels]
-    keys = ["rest", "scene", "seed", "region", "metric", "unit"]
-    return results.assign(level=level, rest=rest).set_index([*keys, "level"])["value"].unstack("level")
+    shown = results["scene"].map(lambda scene: read_scene(str(scene)).name)  # noisy or in half size, it is one scene
+    keys = ["rest", "shown", "scene", "seed", "region", "metric", "unit"]
+    return results.assign(level=level, rest=rest, shown=shown).set_index([*keys, "level"])["value"].unstack("level")

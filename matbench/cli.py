@@ -40,6 +40,8 @@ app = App(
 
 `matbench compare --plugin mine.py -a mine -s 'synthetic/box[noise=0,4,8]' --record`
 
+`matbench compare -s 'synthetic/box[noise=0,2,4,8]'`  several numbers give a curve in the report
+
 `matbench ablate 'materiality[pairs=all,consecutive]' -s 'middlebury*/*' --data DATA`
 
 `matbench list`  methods with their parameters, scenes, metrics
@@ -87,6 +89,7 @@ def compare(
     data: Data = None,
     out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,
     record: Annotated[bool, Parameter(negative="", help="Also write a recording of every cell for `view`.")] = False,
+    row: Annotated[str | None, Parameter(help="Image row of the recordings' slices; default the middle one.")] = None,
     seed: Seeds = None,
     plugin: Plugins = None,
     metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1",
@@ -103,14 +106,28 @@ def compare(
     `matbench compare -a sgbm -a materiality -s middlebury2001/venus --data ~/stereo`
 
     `matbench compare -a 'okutomi_kanade[window=3,5,7]' -s 'synthetic/*' -m bad_2`
+
+    An option of a scene, or a parameter, that takes three numbers or more gives curves. `views=N` is that many views
+    as wide as they fit, `baseline=N` how many view steps apart the outermost are:
+
+    `matbench compare -a okutomi_kanade -s 'middlebury2003/teddy[views=3 baseline=2,4,6]' --data DATA`
     """
     from matbench import comparison
 
     _check_metric(metric)
+    if row is not None and not record:
+        raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
         _say_missing(comparison.default_scenes(data)[1], data)
     ready = comparison.prepare(
-        algorithm, scene, data=data, out=out, record=record, seed=_whole(seed), plugin=plugin or ()
+        algorithm,
+        scene,
+        data=data,
+        out=out,
+        record=record,
+        seed=[_whole("seed", one) for one in seed or ("0",)],
+        plugin=plugin or (),
+        row=None if row is None else _whole("row", row),
     )
     return _work(ready, metric)
 
@@ -131,13 +148,16 @@ def ablate(
     """Run every combination of a method's parameters and tell what each factor does.
 
     Differences are paired by scene, all else equal; intervals and effect sizes are over scenes.
-    The first value of a parameter is the base that the others are compared with.
+    The first value of a parameter is the base that the others are compared with. Options of scenes may vary, too:
+    what takes three numbers or more gives curves.
 
     **Examples**
 
     `matbench ablate 'materiality[pairs=all,consecutive binarization=plane,volume]' -s 'middlebury*/*' --data DATA`
 
     `matbench ablate algorithms/ablations/pairs.toml --data DATA`
+
+    `matbench ablate 'materiality[views=0]' -s 'middlebury*/*[views=2,3,5,7,9]' --data DATA`
 
     Parameters
     ----------
@@ -152,17 +172,18 @@ def ablate(
     if selector.endswith(".toml"):
         algorithms, listed = comparison.read_request(Path(selector))
         scene = scene or listed
-    ablation.factors(methods(algorithms, plugin or ()))
-    ready = comparison.prepare(algorithms, scene, data=data, out=out, seed=_whole(seed), plugin=plugin or ())
-    return _work(ready, metric, is_ablation=True)
+    chosen = methods(algorithms, plugin or ())
+    ablation.check_varies(chosen, scene or ())
+    seeds = [_whole("seed", one) for one in seed or ("0",)]
+    ready = comparison.prepare(algorithms, scene, data=data, out=out, seed=seeds, plugin=plugin or ())
+    return _work(ready, metric, is_ablation=any(ablation.factors(chosen).values()))
 
 
-def _whole(seeds: list[str] | None) -> list[int]:
-    """Seeds as typed; a seed that is no whole number is refused, not rounded."""
-    for seed in seeds or ():
-        if not re.fullmatch(r"[0-9]{1,9}", seed):
-            raise UserError(f"seed {seed!r} is not a whole number from 0 to 999999999")
-    return [int(seed) for seed in seeds or ("0",)]
+def _whole(name: str, text: str) -> int:
+    """A number as typed; one that is not whole is refused, not rounded."""
+    if not re.fullmatch(r"[0-9]{1,9}", text):
+        raise UserError(f"{name} {text!r} is not a whole number from 0 to 999999999")
+    return int(text)
 
 
 def _check_metric(metric: str) -> None:
@@ -177,14 +198,17 @@ def _check_metric(metric: str) -> None:
 def _work(ready: "Comparison", metric: str, is_ablation: bool = False) -> int:
     """Run, print and report a comparison; the exit status."""
     console = Console()
-    for scene in ready.left_out:
-        console.print(f"without {scene}", markup=False, highlight=False, soft_wrap=True)
+    for reason, scenes in ready.left_out.items():
+        console.print(f"without {', '.join(scenes)}: {reason}", markup=False, highlight=False, soft_wrap=True)
     stopped = _run(ready, console)
     results, cells = ready.tables()
+    sweeps = ready.sweeps(results)
     switches = ready.ablation(results) if is_ablation else None
-    report = ready.report(results, cells, switches)
-    _print_tables(results, cells, switches, metric, console)
+    report = ready.report(results, cells, switches, sweeps)
+    _print_tables(results, cells, switches, sweeps, metric, console)
     written = {"scores": ready.folder / "results.csv", "report": report}
+    if sweeps:
+        written["curves"] = ready.folder / "sweeps.csv"
     if is_ablation:
         written["ablation"] = ready.folder / "ablation.csv"
     for what, path in written.items():
@@ -214,7 +238,7 @@ def _run(ready: "Comparison", console: Console) -> bool:
 
     from matbench.run import pending
 
-    todo = len(pending(ready.plan, ready.store, ready.record))
+    todo = len(pending(ready.plan, ready.store, ready.record, ready.row))
     total = len(ready.plan.cells)
     if todo < total:
         console.print(f"{total - todo} of {total} cells are done already in {ready.folder}", highlight=False)
@@ -240,13 +264,15 @@ def _run(ready: "Comparison", console: Console) -> bool:
     return False
 
 
-def _print_tables(results: Any, cells: Any, switches: Any, metric: str, console: Console) -> None:
+def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
     from matbench import scoring
+    from matbench.reports import curves, tables
     from matbench.reports import switches as effects
-    from matbench.reports import tables
 
     higher = next(m.better for m in scoring.metrics() if m.name == metric) == "higher"
     for table in tables.terminal(results, cells, metric, higher, console.width):
+        console.print(table)
+    for table in curves.terminal(sweeps, metric):
         console.print(table)
     if switches is not None:
         for table in effects.terminal(switches, metric):

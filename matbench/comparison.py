@@ -14,17 +14,19 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench import plugins, run, scoring
+from matbench import plugins, run, scoring, spec
 from matbench._version import __version__
 from matbench.dataset import Listing
 from matbench.errors import UserError, unknown
 from matbench.plan import Plan, make_plan, methods
-from matbench.scene import Scene
-from matbench.scenes import PAPER_SCENES, Selection, data_root, listings, load_scene, select
+from matbench.scene import NotInScene, Scene
+from matbench.scenes import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
 from matbench.store import Store, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from matbench.sweeps import Sweep
 
 RUNS = Path("runs")
 
@@ -41,8 +43,10 @@ class Comparison:
         Write a recording of every cell.
     command
         The line that asked for it, for the report.
+    row
+        The image row that recordings show; the middle one of each scene if None.
     left_out
-        Scenes that a pattern means but that cannot be compared, and why.
+        Why -> scenes that a pattern means but that cannot be compared.
     """
 
     plan: Plan
@@ -51,7 +55,8 @@ class Comparison:
     data: Path | None
     record: bool
     command: str
-    left_out: tuple[str, ...] = ()
+    row: int | None = None
+    left_out: Mapping[str, Sequence[str]] = {}
 
     @property
     def folder(self) -> Path:
@@ -63,7 +68,7 @@ class Comparison:
         found = plugins.algorithms([Path(file) for file in self.plan.plugin_files])
         entries = [found[name].entry for name in sorted(names)]
         preload = [entry.module for entry in entries if not isinstance(entry, type)]
-        run.run(self.plan, self.store, data=self.data, record=self.record, preload=preload, listen=listen)
+        run.run(self.plan, self.store, data=self.data, record=self.record, row=self.row, preload=preload, listen=listen)
 
     def tables(self) -> "tuple[pd.DataFrame, pd.DataFrame]":
         """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
@@ -72,6 +77,15 @@ class Comparison:
         for name, table in (("results.csv", results), ("cells.csv", cells)):
             write_text(self.folder / name, table.to_csv(index=False))
         return results, cells
+
+    def sweeps(self, results: "pd.DataFrame") -> "list[Sweep]":
+        """The curves of whatever takes several numbers; written as ``sweeps.csv`` if there are any."""
+        from matbench.sweeps import sweeps, table
+
+        found = sweeps(self.plan, results)
+        if found:
+            write_text(self.folder / "sweeps.csv", table(found).to_csv(index=False))
+        return found
 
     def ablation(self, results: "pd.DataFrame") -> "pd.DataFrame":
         """What each factor does; written as ``ablation.csv`` and ``ablation.tex``, too."""
@@ -83,7 +97,13 @@ class Comparison:
         write_text(self.folder / "ablation.tex", switches.latex(table))
         return table
 
-    def report(self, results: "pd.DataFrame", cells: "pd.DataFrame", ablation: "pd.DataFrame | None" = None) -> Path:
+    def report(
+        self,
+        results: "pd.DataFrame",
+        cells: "pd.DataFrame",
+        ablation: "pd.DataFrame | None" = None,
+        sweeps: "Sequence[Sweep]" = (),
+    ) -> Path:
         """Write ``report.html``."""
         from matbench.reports import page
 
@@ -108,6 +128,7 @@ class Comparison:
                 scenes=self.scenes,
                 facts=machine(),
                 ablation=ablation,
+                sweeps=tuple(sweeps),
                 higher=frozenset(m.name for m in scoring.metrics() if m.better == "higher"),
             ),
         )
@@ -194,6 +215,7 @@ def prepare(
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     command: str | None = None,
+    row: int | None = None,
 ) -> Comparison:
     """Check everything that was asked for, read every scene, and only then write the plan.
 
@@ -207,18 +229,33 @@ def prepare(
     selected = select(scenes, root) if scenes is not None else Selection(tuple(default_scenes(root)[0]))
     if not chosen or not selected.names:
         raise UserError("nothing to compare: name at least one algorithm and one scene")
+    named = {str(one) for one in spec.expand(scenes or ()) if not is_pattern(one.name)}
     loaded: dict[tuple[str, str], Scene] = {}  # a scene spelled in two ways is one scene
+    spellings: dict[str, str] = {}
+    left_out = {reason: list(names) for reason, names in selected.left_out.items()}
     for name in selected.names:
-        scene = load_scene(name, root)
+        try:
+            scene = load_scene(name, root)
+        except NotInScene:
+            if name in named:
+                raise
+            left_out.setdefault("the scenes have not these views", []).append(name)
+            continue
         if scene.ref not in scene.truth:
             raise UserError(f"{name} has no ground truth of its reference view {scene.labels[scene.ref]}: no scores")
-        loaded.setdefault((scene.digest, scene.truth_digest), scene)
+        if row is not None and not 0 <= row < scene.height:
+            raise UserError(f"row {row} of {name}: 0 to {scene.height - 1} is possible")
+        kept = loaded.setdefault((scene.digest, scene.truth_digest), scene)
+        if kept.name != scene.name:
+            spellings[scene.name] = kept.name
+    if not loaded:
+        raise UserError(f"no scene has the views asked for: {', '.join(selected.names)}")
     by_name = {scene.name: scene for scene in loaded.values()}
-    plan = make_plan(chosen, by_name, seeds, files)
+    plan = make_plan(chosen, by_name, seeds, files, spellings)
     folder = Path(out) if out is not None else RUNS / plan.digest
     store = Store.open(folder, plan)
     said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
-    return Comparison(plan, store, by_name, root, record, said, selected.left_out)
+    return Comparison(plan, store, by_name, root, record, said, row, left_out)
 
 
 def compare(
@@ -230,6 +267,7 @@ def compare(
     record: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
+    row: int | None = None,
 ) -> "pd.DataFrame":
     """Run methods on scenes and score them; the run folder stays for `matbench view` and the report.
 
@@ -252,6 +290,8 @@ def compare(
         One seed or several.
     plugin
         Python files that hold further methods.
+    row
+        The image row whose epipolar slices recordings show; the middle one if not given.
 
     Returns
     -------
@@ -272,8 +312,9 @@ def compare(
         seed=seed,
         plugin=plugin,
         command="matbench.compare(...)",
+        row=row,
     )
     comparison.run()
     results, cells = comparison.tables()
-    comparison.report(results, cells)
+    comparison.report(results, cells, sweeps=comparison.sweeps(results))
     return results

@@ -8,7 +8,7 @@ from pathlib import Path
 from matbench import plugins
 from matbench.dataset import Download
 from matbench.errors import UserError, unknown
-from matbench.scenes import DATA_VARIABLE, group, user_root
+from matbench.scenes import DATA_VARIABLE, group, is_pattern, user_root
 from matbench.spec import expand
 
 
@@ -53,8 +53,7 @@ def downloads(selectors: str | Iterable[str]) -> tuple[list[Download], list[str]
             if option != "size":
                 raise unknown(f"option of fetch in {str(spec)!r}", option, ["size"])
         size = spec.options.get("size")
-        several = group(spec.name, known)
-        names = several if several is not None else [_fetchable(spec.name, known)]
+        names = group(spec.name, known) if is_pattern(spec.name) else [_fetchable(spec.name, known)]
         fit = {name: _of_size(known[name], size) for name in names}
         found |= {one.name: one for one in fit.values() if one is not None}
         others = [f"{name}: {_sizes_in_words(known[name], size)}" for name, one in fit.items() if one is None]

@@ -12,6 +12,11 @@ from matbench import plugins, scoring, spec
 from matbench.errors import UserError
 from matbench.scenes import listings
 
+OPTIONS = """\
+In brackets after a real or synthetic scene: views=3 (that many, as wide as they fit), views=0:9:2 or views=2+4+6 \
+(by their labels), baseline=4 (view steps from the first to the last), ref=2 (the view to score), \
+disparities=0:21 (to search, pixels of the pair), size=half."""
+
 
 def known(data: Path | None = None, files: Sequence[Path] = ()) -> dict[str, Any]:
     """Everything that can be named on the command line, as plain values for JSON."""
@@ -77,6 +82,8 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         "present",
         title="Scenes",
         title_justify="left",
+        caption=OPTIONS,
+        caption_justify="left",
     )
     for name, facts in everything["scenes"].items():
         if "error" in facts:

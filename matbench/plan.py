@@ -75,10 +75,13 @@ class Plan:
         What is to be computed.
     plugin_files
         The users' own files that hold methods.
+    spellings
+        Other names by which scenes were asked for -> what they are called in the cells.
     """
 
     cells: tuple[Cell, ...]
     plugin_files: tuple[str, ...] = field(default=())
+    spellings: Mapping[str, str] = field(factory=dict)
 
     @property
     def request(self) -> dict[str, Any]:
@@ -120,7 +123,11 @@ def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[
 
 
 def make_plan(
-    chosen: Sequence[Method], scenes: Mapping[str, Scene], seeds: Sequence[int], files: Sequence[Path] = ()
+    chosen: Sequence[Method],
+    scenes: Mapping[str, Scene],
+    seeds: Sequence[int],
+    files: Sequence[Path] = (),
+    spellings: Mapping[str, str] | None = None,
 ) -> Plan:
     """Every method on every scene with every seed."""
     cells = []
@@ -129,4 +136,4 @@ def make_plan(
             for seed in seeds:
                 facts = [SCHEMA, method.algorithm, dict(method.params), method.code, name, scene.digest, seed]
                 cells.append(Cell(method, name, scene.digest, seed, digest(facts)))
-    return Plan(tuple(cells), tuple(str(path) for path in files))
+    return Plan(tuple(cells), tuple(str(path) for path in files), spellings or {})

@@ -26,14 +26,19 @@ def threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def pending(plan: Plan, store: Store, record: bool) -> list[Cell]:
-    """The cells that still have to be computed: those without a final outcome or a recording asked for."""
+def pending(plan: Plan, store: Store, record: bool, row: int | None = None) -> list[Cell]:
+    """The cells that still have to be computed: those without a final outcome or a recording asked for.
+
+    A recording that shows another row than `row` is made anew.
+    """
 
     def is_done(cell: Cell) -> bool:
         outcome = store.outcome(cell)
         if outcome is None or outcome.status not in FINAL:
             return False
-        return not (record and outcome.status == "ok") or (store.cell(cell) / "recording.rrd").exists()
+        if not record or outcome.status != "ok":
+            return True
+        return (store.cell(cell) / "recording.rrd").exists() and row in (None, outcome.row)
 
     return [cell for cell in plan.cells if not is_done(cell)]
 
@@ -72,6 +77,7 @@ def run(
     *,
     data: Path | None,
     record: bool = False,
+    row: int | None = None,
     preload: Iterable[str] = (),
     listen: Listener | None = None,
 ) -> None:
@@ -84,13 +90,15 @@ def run(
 
     Parameters
     ----------
+    row
+        The image row that recordings show; the middle one if None.
     preload
         Modules that the server imports besides the harness, such as those of the methods.
     listen
         Told as each cell starts and ends.
     """
     tell = listen or (lambda *_: None)
-    todo = pending(plan, store, record)
+    todo = pending(plan, store, record, row)
     if not todo:
         return
     store.sweep()
@@ -100,7 +108,7 @@ def run(
         try:
             for cell in todo:
                 tell("start", cell, None)
-                job = Job(store.folder, cell, data, plan.plugin_files, threads(), record)
+                job = Job(store.folder, cell, data, plan.plugin_files, threads(), record, row)
                 outcome = _finish(pool, job, store)
                 tell("done", cell, outcome)
         except BaseException:

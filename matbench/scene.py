@@ -19,6 +19,10 @@ class SceneError(UserError):
     """A scene that contradicts itself, or a choice of views that it cannot give."""
 
 
+class NotInScene(SceneError):
+    """A number of views, or a baseline, that a scene does not have: patterns leave such scenes out."""
+
+
 @frozen
 class Range:
     """Least and largest disparity, both included, in pixels per view step; may be negative.
@@ -201,14 +205,31 @@ class Scene:
         its middle, then the one that reaches further right. On the paper's scenes four views are
         Tsukuba col2-5, Rocks1 view0-3 and Teddy im0, 2, 4, 6, as in the paper.
         """
-        count = min(count, self.n)
         if count < 2:
             raise SceneError(f"{self.name}: {count} views asked for; at least two are needed")
-        fits = [
-            (step, -abs(2 * place - (count - 1)), -place, self.ref - place * step)
-            for step in range(1, (self.n - 1) // (count - 1) + 1)
-            for place in range(count)
-            if self.ref - place * step >= 0 and self.ref + (count - 1 - place) * step < self.n
-        ]
-        step, _, _, first = max(fits)
-        return tuple(range(first, first + count * step, step))
+        found = evenly_spaced(self.n, self.ref, min(count, self.n))
+        assert found, "neighbours of the reference view always fit"  # noqa: S101
+        return found
+
+
+def evenly_spaced(n: int, ref: int, count: int, baseline: int | None = None) -> tuple[int, ...]:
+    """Indices of `count` >= 2 evenly spaced views of n, `ref` among them; none if they do not fit.
+
+    Parameters
+    ----------
+    baseline
+        View steps from the first to the last of them; the widest that fits if not given. Of
+        several choices the one that has the reference view nearest to its middle is taken, then
+        the one that reaches further right.
+    """
+    fits = [
+        (step, -abs(2 * place - (count - 1)), -place, ref - place * step)
+        for step in range(1, (n - 1) // (count - 1) + 1)
+        for place in range(count)
+        if ref - place * step >= 0 and ref + (count - 1 - place) * step < n
+        if baseline in (None, step * (count - 1))
+    ]
+    if not fits:
+        return ()
+    step, _, _, first = max(fits)
+    return tuple(range(first, first + count * step, step))

@@ -73,17 +73,22 @@ def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
 
 @frozen
 class Selection:
-    """Names of scenes, and in words which others a pattern means but cannot have."""
+    """Names of scenes, and why -> which others a pattern means but cannot have."""
 
     names: tuple[str, ...]
-    left_out: tuple[str, ...] = ()
+    left_out: Mapping[str, Sequence[str]] = {}
 
 
-def group(name: str, known: Iterable[str]) -> list[str] | None:
-    """The names that a pattern, or a name of several scenes such as ``paper``, means; None for a plain name."""
+def is_pattern(name: str) -> bool:
+    """Does a name stand for all scenes that it matches, or for a group such as ``paper``?"""
+    return name in GROUPS or re.search(r"[*?]", name) is not None
+
+
+def group(name: str, known: Iterable[str]) -> list[str]:
+    """The names that a pattern, or a name of several scenes such as ``paper``, means."""
     if name in GROUPS:
         return [one for one in GROUPS[name] if one in set(known)]
-    return [one for one in known if fnmatchcase(one, name)] if re.search(r"[*?]", name) else None
+    return [one for one in known if fnmatchcase(one, name)]
 
 
 def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Selection:
@@ -97,15 +102,14 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Se
         For a malformed selector, or a pattern that matches no scene present.
     """
     names: dict[str, None] = {}
-    left_out: list[str] = []
+    left_out: dict[str, list[str]] = {}
+    known: dict[str, Listing | UserError] | None = None
     for spec in expand(selectors):
-        known: dict[str, Listing | UserError] = {}
-        if spec.name in GROUPS or re.search(r"[*?]", spec.name):
-            known = listings(data)
-        hits = group(spec.name, known)
-        if hits is None:
+        if not is_pattern(spec.name):
             names[str(spec)] = None
             continue
+        known = known if known is not None else listings(data)
+        hits = group(spec.name, known)
         size = spec.options.get("size")
         offered = {name: found for name in hits if isinstance(found := known[name], Listing)}
         present = {name: found for name, found in offered.items() if found.present or found.complete}
@@ -113,9 +117,11 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Se
         fit = [name for name, reason in why.items() if not reason]
         if not fit:
             raise _no_match(spec, hits, why)
-        left_out += [f"{name}: {reason}" for name, reason in why.items() if reason]
+        for name, reason in why.items():
+            if reason and name not in left_out.setdefault(reason, []):
+                left_out[reason].append(name)
         names |= {str(Spec(name, spec.options)): None for name in fit}
-    return Selection(tuple(names), tuple(left_out))
+    return Selection(tuple(names), left_out)
 
 
 def _unfit(listing: Listing, size: str | None) -> str:

@@ -75,6 +75,19 @@ def parse(selector: str) -> list[Spec]:
     return specs
 
 
+def read_scene(name: str) -> Spec:
+    """A scene's name and its options; a dataset may call a scene what is no selector, too.
+
+    >>> read_scene("synthetic/box[n=3]").options, read_scene("a b[").name
+    ({'n': '3'}, 'a b[')
+    """
+    try:
+        (found,) = parse(name)
+    except (UserError, ValueError):
+        return Spec(name)
+    return found
+
+
 def _strict(kind: type, read: Mapping[str, Any] | None = None) -> Any:
     def hook(value: Any, _: type) -> Any:
         if isinstance(value, kind) and not (kind is not bool and isinstance(value, bool)):

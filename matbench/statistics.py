@@ -4,12 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 FEW = 6
 """Fewer scenes than these carry no conclusion: even if all agreed in sign, chance does so in 1 of 16 runs."""
 
 CONFIDENCE = 0.95
 _RESAMPLES = 4999
+_BATCH = 256  # resamples at once: bounds the memory that many rows take
 
 
 @frozen
@@ -48,8 +50,8 @@ class Effect:
 def paired_effect(differences: Sequence[float]) -> Effect:
     """The effect that one difference per scene shows; NaN differences are left out.
 
-    Scenes are resampled, not pixels: pixels of one scene are no independent witnesses. The
-    resampling is seeded, so that the same differences give the same interval.
+    Scenes are resampled, not pixels: pixels of one scene are no independent witnesses. The same
+    differences give the same interval.
     """
     values = np.asarray(differences, np.float64)
     values = values[np.isfinite(values)]
@@ -59,14 +61,30 @@ def paired_effect(differences: Sequence[float]) -> Effect:
     mean, spread = float(values.mean()), float(values.std(ddof=1))
     if spread == 0:
         return Effect(mean, mean, mean, float(np.sign(mean) * np.inf) if mean else float("nan"), int(values.size))
+    low, high = intervals(values)
+    return Effect(mean, float(low), float(high), mean / spread, int(values.size))
+
+
+def intervals(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper ends of the bootstrap intervals of means over the last axis, the scenes.
+
+    Percentiles, `CONFIDENCE`. Scenes are resampled, seeded: every row by the same draws.
+
+    Parameters
+    ----------
+    values
+        (..., scenes) float64, at least two scenes, all finite.
+    """
     from scipy.stats import bootstrap
 
-    interval = bootstrap(
+    found = bootstrap(
         (values,),
         np.mean,
+        axis=-1,
+        batch=_BATCH,
         confidence_level=CONFIDENCE,
         n_resamples=_RESAMPLES,
         method="percentile",
         rng=np.random.default_rng(0),
     ).confidence_interval
-    return Effect(mean, float(interval.low), float(interval.high), mean / spread, int(values.size))
+    return np.asarray(found.low), np.asarray(found.high)

@@ -39,6 +39,8 @@ class Outcome:
         Why it is not `ok`, in one line.
     work, history
         As the estimate gave them; None for a number that is not finite.
+    row
+        The image row that its recording shows, if it has one.
     """
 
     status: Status
@@ -49,6 +51,7 @@ class Outcome:
     reason: str = ""
     work: Mapping[str, int] = {}
     history: Mapping[str, list[float | None]] = {}
+    row: int | None = None
 
 
 def write_text(path: Path, text: str) -> None:

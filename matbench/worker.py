@@ -34,6 +34,8 @@ class Job:
     ----------
     record
         Solve a second time, untimed, and write a recording.
+    row
+        The image row that it shows; the middle one if None.
     """
 
     run: Path
@@ -42,6 +44,7 @@ class Job:
     plugin_files: tuple[str, ...]
     threads: int
     record: bool
+    row: int | None = None
 
 
 def tiny(scene: Scene) -> Scene:
@@ -139,21 +142,22 @@ def _solve(method: Algorithm, scene: Scene, job: Job) -> tuple[Outcome, dict[int
     return Outcome("ok", seconds, warmed - start, peak, job.threads, "", work, history), maps
 
 
-def _record(method: Algorithm, job: Job, path: Path) -> str:
-    """Solve again, recorded; why there is no recording, if there is none: the answer itself stands."""
+def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcome:
+    """Solve again, recorded; the outcome with the row shown, or why there is no recording: the answer itself stands."""
     from matbench.recording import record
 
     scene = load_scene(job.cell.scene, job.data)
+    row = scene.height // 2 if job.row is None else job.row
 
     def solve(probe: Any) -> Estimate:
         return method.solve(hide_truth(scene), Context(job.cell.seed, job.threads, probe))
 
     try:
-        record(path, scene, solve, title=str(job.cell))
+        record(path, scene, solve, title=str(job.cell), row=row)
     except Exception as error:
         traceback.print_exc()
-        return f"not recorded: {type(error).__name__}: {first_line(error)}"
-    return ""
+        return evolve(outcome, reason=f"not recorded: {type(error).__name__}: {first_line(error)}")
+    return evolve(outcome, row=row)
 
 
 def run_cell(job: Job) -> None:
@@ -173,7 +177,7 @@ def run_cell(job: Job) -> None:
                 raise UserError(f"{cell.scene} is not what it was when the run was planned")
             outcome, maps = _solve(method, scene, job)
             if job.record and outcome.status == "ok":
-                outcome = evolve(outcome, reason=_record(method, job, draft / "recording.rrd"))
+                outcome = _record(method, job, draft / "recording.rrd", outcome)
         except (Exception, SystemExit, KeyboardInterrupt) as error:  # Ctrl-C never comes to this process
             traceback.print_exc()
             outcome, maps = Outcome("failed", reason=f"{type(error).__name__}: {first_line(error)}"), None

@@ -8,6 +8,7 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 
 from matbench.scene import Scene
+from matbench.sweeps import Sweep
 
 Key = tuple[str, str, str, int]
 """Algorithm, parameters, scene and seed: the names of a cell."""
@@ -39,6 +40,8 @@ class Report:
         What it ran on, as shown: ``{"numpy": "2.4.1", "processor": ...}``.
     ablation
         What each factor does (`matbench.ablation.COLUMNS`), if that was asked for.
+    sweeps
+        What took several numbers, as curves.
     higher
         Metrics of which more is better; of all others, less is.
     """
@@ -51,6 +54,7 @@ class Report:
     scenes: Mapping[str, Scene] = field(factory=dict)
     facts: Mapping[str, str] = field(factory=dict)
     ablation: pd.DataFrame | None = None
+    sweeps: tuple[Sweep, ...] = ()
     higher: frozenset[str] = frozenset()
 
     def disparity(self, algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:

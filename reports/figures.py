@@ -47,7 +47,8 @@ def gradient(name: str, stops: int = 17) -> str:
     return ", ".join("#{:02x}{:02x}{:02x}".format(*map(int, c)) for c in palette(name, stops))
 
 
-def _printable(name: str, longest: int = 44) -> str:
+def printable(name: str, longest: int = 44) -> str:
+    """A name of at most `longest` characters, none of which do anything."""
     name = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in name)
     return name if len(name) <= longest else name[: longest // 2] + "…" + name[1 - longest // 2 :]
 
@@ -111,7 +112,7 @@ def cost(rows: pd.DataFrame, score: str, unit: str) -> "Figure | None":
         Of that column.
     """
     ranked = rows[rows["ranked"]].dropna(subset=[score, "seconds"])
-    points = [(max(float(r["seconds"]), 1e-4), float(r[score]), _printable(str(m))) for m, r in ranked.iterrows()]
+    points = [(max(float(r["seconds"]), 1e-4), float(r[score]), printable(str(m))) for m, r in ranked.iterrows()]
     if not points:
         return None
     from matplotlib.figure import Figure
@@ -156,4 +157,7 @@ def svg(figure: "Figure") -> str:
         r"font-family: [^;\"]*; ",
     ):
         text = re.sub(unwanted, "", text, flags=re.DOTALL)
+    used = set(re.findall(r"#([\w.-]+)", text))
+    # several figures stand in one page: no name twice
+    text = re.sub(r'\sid="([\w.-]+)"', lambda found: found[0] if found[1] in used else "", text)
     return re.sub(r'^<svg [^>]*?viewBox="([^"]*)"[^>]*>', r'<svg viewBox="\1" aria-hidden="true">', text)

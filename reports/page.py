@@ -15,7 +15,7 @@ from attrs import evolve
 from markupsafe import Markup, escape
 
 from matbench import coloring
-from matbench.reports import figures, switches, tables
+from matbench.reports import curves, figures, switches, tables
 from matbench.reports.content import Report
 from matbench.reports.tables import METRIC, REGION, Shared
 from matbench.scene import Scene
@@ -65,6 +65,7 @@ def render(report: Report) -> str:
         scenes_table=_default_scenes(report, scope),
         data=_data(report, scope),
         figure=_figure(rows),
+        curves=_curves(report),
         scenes=_scenes(report, scope),
         disparity_bar=figures.gradient(coloring.DISPARITY),
         error_bar=figures.gradient(coloring.ERROR),
@@ -94,7 +95,8 @@ def _answer(rows: pd.DataFrame, scope: Shared) -> dict[str, Any]:
         "next_score": shown[rest[0]] if rest else "",
         "compared": len(shown),
         "scenes": len(scope.scenes),
-        "few": len(scope.scenes) < FEW,
+        "distinct": scope.distinct,
+        "few": scope.distinct < FEW,
         "unranked": [str(m) for m in rows.index[~rows["ranked"]]],
     }
 
@@ -170,6 +172,20 @@ def _figure(rows: pd.DataFrame) -> str | None:
 
 def _svg(figure: "Figure | None") -> str | None:
     return None if figure is None else figures.svg(figure)
+
+
+def _curves(report: Report) -> list[dict[str, Any]]:
+    """Sweep by sweep: title, caption, figure and the numbers in it."""
+    return [
+        {
+            "title": curves.title(sweep),
+            "caption": curves.caption(sweep),
+            "figure": _svg(curves.figure(sweep)),
+            "heads": [f"{value:g}" for value in sweep.values],
+            "lines": curves.lines(sweep).values.tolist(),
+        }
+        for sweep in report.sweeps
+    ]
 
 
 def _scenes(report: Report, scope: Shared) -> Iterator[dict[str, Any]]:

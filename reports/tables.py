@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 import pandas as pd
 from attrs import frozen
 
+from matbench.spec import read_scene
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -57,6 +59,11 @@ class Shared:
     asked: tuple[str, ...]
     has: Mapping[str, frozenset[str]]
     scenes: tuple[str, ...]
+
+    @property
+    def distinct(self) -> int:
+        """How many shared scenes there are if one scene with different options is one witness."""
+        return len({read_scene(scene).name for scene in self.scenes})
 
     def is_ranked(self, method: str) -> bool:
         """Only who has every shared scene is compared with the others."""

@@ -58,7 +58,7 @@ def _number(value: float, unit: str, place: int) -> Text:
 def _summary(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str, higher: bool, width: int) -> Table:
     rows, unit = summary(results, cells, metric, higher), metrics(results).get(metric, "%")
     count = f"{len(scope.scenes)} of {len(scope.asked)} scenes"
-    hint = "; too few scenes to conclude" if len(scope.scenes) < FEW else ""
+    hint = "; too few scenes to conclude" if scope.distinct < FEW else ""
     table = _plain(f"{metric} ({unit}) by region, mean over {count}{hint}")
     table.add_column("#", justify="right", no_wrap=True)
     table.add_column("method", overflow="fold", min_width=12)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from matbench.ablation import ablation, factors
+from matbench.ablation import ablation, check_varies
 from matbench.errors import UserError
 from matbench.plan import Cell, Method, Plan
 from matbench.statistics import FEW, paired_effect
@@ -94,6 +94,19 @@ def test_a_failed_combination_leaves_its_partner_out() -> None:
     assert ablation(plan, kept).scenes.item() == 7
 
 
+def test_a_scene_in_several_guises_is_one_scene() -> None:
+    methods = [method("all", 3), method("some", 3)]
+    plan, results = run(methods, {(m.changed, f"s{i}"): float(i * len(m.changed)) for m in methods for i in range(8)})
+    guises = {f"s{i}": f"s{i % 4}[noise={i // 4}]" for i in range(8)}
+    effect = ablation(plan, results.assign(scene=results.scene.map(guises)))
+    plain = ablation(plan, results)
+    assert (effect.scenes.item(), plain.scenes.item()) == (4, 8)
+    assert effect.change.item() == pytest.approx(plain.change.item())
+    assert effect.verdict.item() == "too few scenes"
+
+
 def test_nothing_to_ablate_is_said() -> None:
     with pytest.raises(UserError, match="nothing varies"):
-        factors([method("all", 3)])
+        check_varies([method("all", 3)], ["synthetic/box[noise=0,4]"])
+    check_varies([method("all", 3), method("some", 3)], [])
+    check_varies([method("all", 3)], ["synthetic/box[noise=0,4,8]"])

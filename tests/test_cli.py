@@ -41,6 +41,12 @@ def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str
         (["--seed=-1"], "seed '-1' is not a whole number"),
         (["--seed", "x"], "seed 'x' is not a whole number"),
         (["--seed", "1.5"], "seed '1.5' is not a whole number"),
+        (["--row", "5"], "--row 5 chooses what recordings show: add --record"),
+        (["--row", "1.5", "--record"], "row '1.5' is not a whole number"),
+        (["--row", "72", "--record"], "row 72 of synthetic/box[size=96x72]: 0 to 71 is possible"),
+        (["-s", "synthetic/box[views=9]"], "views=9 of synthetic/box: it has 5 views, 2 to 5 is possible"),
+        (["-s", "synthetic/*[views=9]"], "no scene has the views asked for: synthetic/box[views=9]"),
+        (["-s", "synthetic/box[disparities=9:1]"], "disparities=9:1 of synthetic/box: LEAST:LARGEST"),
         (["--bogus"], "Unknown option"),
     ],
 )

@@ -271,6 +271,67 @@ def test_recordings_are_written_on_request_and_found_by_name(tmp_path: Path) -> 
     assert found.stat().st_mtime_ns == before
 
 
+def test_recordings_of_another_row_are_made_anew(tmp_path: Path) -> None:
+    def shown() -> int:
+        (path,) = (tmp_path / "run" / "cells").glob("*/cell.json")
+        return int(json.loads(path.read_text())["outcome"]["row"])
+
+    compare(tmp_path, "flat", record=True)
+    assert shown() == 36
+    store = comparison.Store(tmp_path / "run")
+    before = store.recording().stat().st_mtime_ns
+    compare(tmp_path, "flat", record=True, row=36)
+    assert store.recording().stat().st_mtime_ns == before
+    compare(tmp_path, "flat", record=True, row=20)
+    assert (shown(), store.recording().stat().st_mtime_ns > before) == (20, True)
+    before = store.recording().stat().st_mtime_ns
+    compare(tmp_path, "flat", record=True)
+    assert store.recording().stat().st_mtime_ns == before
+
+
+def test_a_sweep_of_a_scene_is_a_curve(tmp_path: Path) -> None:
+    scene = "synthetic/box[size=96x72 noise=0,2,40]"
+    results = compare(tmp_path, "sgbm", "flat", scene=scene)
+    table = pd.read_csv(tmp_path / "run" / "sweeps.csv", keep_default_na=False, na_values={"mean": [""]})
+    assert set(table.option) == {"noise"}
+    for row in table.to_dict("records"):
+        one = results[
+            (results.algorithm == row["algorithm"])
+            & (results.scene == f"synthetic/box[noise={row['value']:g} size=96x72]")
+            & (results.region == row["region"])
+            & (results.metric == row["metric"])
+        ]
+        assert row["mean"] == pytest.approx(one.value.item())
+    hard = table[(table.metric == "total_bad_1") & (table.region == "all")].set_index(["algorithm", "value"])["mean"]
+    assert hard["sgbm", 40] > hard["sgbm", 0], "noise makes it harder"
+    assert hard["flat", 40] == hard["flat", 0], "who does not look does not mind"
+    assert 'id="curves"' in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_a_pattern_leaves_out_what_its_scenes_have_not(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "matbench", "ablate", "flat", "--plugin", str(METHODS), "--out", "run"]
+    line += ["-s", "synthetic/*[size=48x36 views=2,3,5,9]", "-s", "synthetic/box[size=48x36 n=9 views=2,3,5,9]"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    first = done.stdout.splitlines()[0]
+    assert first.startswith("without synthetic/box[size=48x36 views=9], synthetic/curved[size=48x36 views=9], ")
+    assert "curves: run/sweeps.csv" in done.stdout
+    assert not (tmp_path / "run" / "ablation.csv").exists(), "no parameter of the method varies"
+    table = pd.read_csv(tmp_path / "run" / "sweeps.csv", keep_default_na=False)
+    assert set(table["values"]) == {"2 3 5", "2 3 5 9"}
+
+
+def test_a_scene_spelled_in_two_ways_keeps_its_place_on_the_curve(tmp_path: Path) -> None:
+    scenes = ["synthetic/box[size=48x36]", "synthetic/box[size=48x36 views=2,3,5]"]
+    ready = comparison.prepare(["flat"], scenes, out=tmp_path / "run", plugin=[METHODS])
+    assert len(ready.plan.cells) == 3
+    assert ready.plan.spellings == {"synthetic/box[size=48x36 views=5]": "synthetic/box[size=48x36]"}
+    assert ready.store.plan() == ready.plan
+    ready.run()
+    (sweep,) = ready.sweeps(ready.tables()[0])
+    assert sweep.values == (2, 3, 5)
+
+
 def test_an_ablation_from_the_command_line(tmp_path: Path) -> None:
     request = tmp_path / "level.toml"
     request.write_text(f'algorithms = ["flat[value=1,2,3]"]\nscenes = ["{SMALL}"]\n')

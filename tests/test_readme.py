@@ -1,5 +1,6 @@
 """What the README shows runs as it stands."""
 
+import json
 import re
 import shlex
 import subprocess
@@ -8,6 +9,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+import rerun as rr
+
+from matbench import load_scene
 
 README = Path(__file__).parent.parent / "README.md"
 if not README.exists():
@@ -44,11 +48,11 @@ def test_the_ablations_vary_something(line: str) -> None:
     from matbench import ablation, comparison, plan
 
     selector = shlex.split(line)[2]
-    chosen = [selector]
+    chosen, scenes = [selector], None
     if selector.endswith(".toml"):
         chosen, scenes = comparison.read_request(README.parent / selector)
         assert scenes
-    assert any(ablation.factors(plan.methods(chosen)).values())
+    ablation.check_varies(plan.methods(chosen), scenes or ())
 
 
 @pytest.mark.parametrize("line", [line for line in LINES if "--data" in line and " ablate " not in line])
@@ -59,6 +63,32 @@ def test_the_lines_on_real_scenes_are_understood(line: str, data_root: Path, tmp
     scenes = [value for flag, value in pairwise(tokens) if flag == "-s"]
     ready = comparison.prepare(["sgbm"], scenes, data=data_root, out=tmp_path / "run")
     assert len(ready.scenes) >= len(scenes)
+
+
+def test_the_papers_setting_is_one_line(data_root: Path, tmp_path: Path) -> None:
+    from matbench.algorithms.sampling import search_space
+
+    (line,) = (line for line in LINES if "preset=paper" in line and "--row" in line)
+    done = matbench(line.replace("DIR", str(data_root)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    (facts,) = (json.loads(path.read_text()) for path in tmp_path.glob("runs/paper/cells/*/cell.json"))
+    params = facts["cell"]["method"]["params"]
+    scene = load_scene(facts["cell"]["scene"], data_root)
+    chosen = scene.choose(scene.widest(params["views"]))
+    assert chosen.labels == ("col2", "col3", "col4", "col5")
+    space = search_space(chosen, params["fineness"])
+    assert (space.first, space.last) == (0, 21)
+    assert facts["outcome"]["row"] == 144
+    (path,) = tmp_path.glob("runs/paper/cells/*/recording.rrd")
+    chunks = rr.chunk.RrdReader(path).stream()
+    rows = {str(chunk.entity_path): chunk.to_record_batch().to_pylist()[0] for chunk in chunks}
+    assert "Epipolar slices** of row 144" in str(rows["/about"])
+    # figure 2: the similarities of the pairs (0,1), (1,2), (2,3), the materialities and the derivative
+    assert {"/slices/similarity", "/slices/materiality", "/slices/derivative"} <= set(rows)
+    volumes = [name.replace("\\", "") for name in rows if "volumes/similarity" in name]
+    assert sorted(volumes) == [f"/volumes/similarity/col{k}-col{k + 1}" for k in (2, 3, 4)]
+    (shape,) = (row["Tensor:data"][0]["shape"] for name, row in rows.items() if name == "/volumes/materiality")
+    assert shape[1] == 22
 
 
 @pytest.mark.parametrize("line", [line for line in LINES if "--data" not in line and "mine.py" not in line])

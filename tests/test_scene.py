@@ -1,10 +1,12 @@
 """Scene, range and choice of views."""
 
+from itertools import combinations, product
+
 import numpy as np
 import pytest
 from attrs import evolve
 
-from matbench.scene import Range, Scene, SceneError
+from matbench.scene import Range, Scene, SceneError, evenly_spaced
 
 
 def make(n: int = 9, ref: int = 2, pair_steps: float = 4) -> Scene:
@@ -52,6 +54,21 @@ def test_impossible_choices_are_refused(indices: list[int]) -> None:
 )
 def test_the_widest_choice_is_that_of_the_paper(n: int, ref: int, count: int, views: tuple[int, ...]) -> None:
     assert make(n, ref).widest(count) == views
+
+
+@pytest.mark.parametrize("n", range(2, 10))
+def test_evenly_spaced_views_are_the_widest_of_all_that_there_are(n: int) -> None:
+    for ref, count in product(range(n), range(2, n + 1)):
+        every = [c for c in combinations(range(n), count) if ref in c and len(set(np.diff(c))) == 1]
+        found = evenly_spaced(n, ref, count)
+        assert found in every
+        assert found[-1] - found[0] == max(c[-1] - c[0] for c in every)
+        for baseline in range(n + 2):
+            some = [c for c in every if c[-1] - c[0] == baseline]
+            exact = evenly_spaced(n, ref, count, baseline)
+            assert exact in some if some else exact == ()
+            nearest = min((abs(2 * ref - c[0] - c[-1]) for c in some), default=0)
+            assert not some or abs(2 * ref - exact[0] - exact[-1]) == nearest, "the reference view is near its middle"
 
 
 def test_arrays_are_read_only_and_detached_from_the_caller() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from matbench.datasets.middlebury import MIDDLEBURY_2001, MIDDLEBURY_2003, MIDDLEBURY_2005, MIDDLEBURY_2006, Middlebury
 from matbench.errors import UserError
+from matbench.scene import NotInScene
 
 WIDTH, HEIGHT = 40, 20
 
@@ -107,6 +108,35 @@ def test_regions_do_not_depend_on_the_choice_of_views(site: Path) -> None:
     assert not whole.regions["occ"][5, -1]
     assert right.regions["occ"][5, -1]
     assert not right.regions["occ"][5, 0]
+
+
+def test_views_are_chosen_by_their_number_with_everything_else_the_same(site: Path) -> None:
+    whole = MIDDLEBURY_2003.load("teddy", {}, site)
+    for options, labels, step in (
+        ({"views": "2"}, "2 8", 6),
+        ({"views": "3"}, "2 5 8", 3),
+        ({"views": "5"}, "0 2 4 6 8", 2),
+        ({"views": "3", "baseline": "4"}, "0 2 4", 2),
+        ({"baseline": "2"}, "1 2 3", 1),
+    ):
+        some = MIDDLEBURY_2003.load("teddy", options, site)
+        assert (" ".join(some.labels), some.labels[some.ref]) == (labels, "2")
+        assert some.pair_steps * step == whole.pair_steps
+        assert some.disparities.largest * some.pair_steps == pytest.approx(59)
+        np.testing.assert_allclose(some.truth[some.ref], whole.truth[whole.ref] * step)
+        for name, mask in whole.regions.items():
+            np.testing.assert_array_equal(mask, some.regions[name])
+    with pytest.raises(NotInScene):
+        MIDDLEBURY_2006.load("Aloe", {"views": "9"}, site)
+
+
+def test_the_range_to_search_may_be_given(site: Path) -> None:
+    whole, wide = (MIDDLEBURY_2003.load("teddy", o, site) for o in ({}, {"disparities": "0:80"}))
+    assert (wide.disparities.least, wide.disparities.largest) == (0, 20)
+    assert wide.name == "middlebury2003/teddy[disparities=0:80]"
+    assert (wide.digest != whole.digest, wide.truth_digest) == (True, whole.truth_digest)
+    some = MIDDLEBURY_2003.load("teddy", {"disparities": "0:80", "views": "5"}, site)
+    assert some.disparities.largest * some.pair_steps == 80
 
 
 def test_the_other_view_with_truth_is_scored_if_only_it_is_chosen(site: Path) -> None:

@@ -157,6 +157,22 @@ def test_every_view_can_be_scored(ref: int) -> None:
     np.testing.assert_array_equal(scene.regions["nonocc"], scene.visible[ref][partner])
 
 
+def test_views_are_chosen_by_their_number_and_the_range_given() -> None:
+    options = {"size": "60x44", "n": "9"}
+    whole = SYNTHETIC.load("box", options, None)
+    for more, labels in (
+        ({"views": "3"}, "048"),
+        ({"baseline": "2"}, "345"),
+        ({"views": "5", "baseline": "4"}, "23456"),
+    ):
+        some = SYNTHETIC.load("box", options | more, None)
+        assert ("".join(some.labels), some.labels[some.ref]) == (labels, "4")
+        for name, mask in whole.regions.items():
+            np.testing.assert_array_equal(mask, some.regions[name])
+    given = SYNTHETIC.load("box", options | {"disparities": "-4:40"}, None)
+    assert (given.disparities.least, given.disparities.largest) == (-1, 10)
+
+
 def test_choosing_views_rescales() -> None:
     options = {"size": "60x44", "noise": "0"}
     whole, some = (SYNTHETIC.load("box", options | more, None) for more in ({}, {"views": "0:5:2"}))

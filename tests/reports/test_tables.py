@@ -114,3 +114,10 @@ def test_terminal_says_nothing_about_nothing(report: Report) -> None:
     assert tables.terminal(report.results.iloc[:0], report.cells.iloc[:0]) == []
     empty = evolve(report, results=report.results.iloc[:0])
     assert len(tables.terminal(empty.results, empty.cells)) == 2
+
+
+def test_one_scene_in_many_guises_is_one_witness(report: Report) -> None:
+    scope = tables.shared(report.results, report.cells)
+    assert scope.distinct == len(scope.scenes) == 2
+    guises = evolve(scope, scenes=tuple(f"made/one[noise={k}]" for k in range(8)))
+    assert guises.distinct == 1
