@@ -26,6 +26,7 @@ from matbench.store import Store, write_text
 if TYPE_CHECKING:
     import pandas as pd
 
+SYNTHETIC_SCENES = ("synthetic/box", "synthetic/curved", "synthetic/weak")
 PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
 RUNS = Path("runs")
 
@@ -139,10 +140,10 @@ def default_algorithms() -> list[str]:
 
 
 def default_scenes(data: str | Path | None = None) -> tuple[list[str], list[str]]:
-    """The built-in synthetic scenes and the paper's three: those that are present, and those missing."""
+    """Three synthetic scenes and the paper's three: those that are present, and those missing."""
     known = listings(data)
     present = {name for name, listing in known.items() if isinstance(listing, Listing) and listing.present}
-    synthetic = [name for name in known if name.startswith("synthetic/") and name in present]
+    synthetic = [name for name in SYNTHETIC_SCENES if name in present]
     paper = [name for name in PAPER_SCENES if name in present]
     return synthetic + paper, [name for name in PAPER_SCENES if name not in present]
 
@@ -238,7 +239,7 @@ def compare(
         methods, and those of `plugin`, if not given.
     scenes
         Selectors such as ``"synthetic/*"`` or ``"middlebury2003/teddy[views=0:9:2]"``; the
-        synthetic scenes and the paper's three where they are present, if not given.
+        default synthetic scenes (box, curved, weak) and the paper's three where they are present, if not given.
     data
         The folder of real scenes; without it the one that MATBENCH_DATA names.
     out

@@ -84,7 +84,7 @@ class Scene:
         thresholds; errors are multiplied by it before they meet a threshold.
     regions
         Name -> (H, W) bool mask of the reference view. They come from the full scene and do not
-        change when views are chosen.
+        change when views are chosen; `scored_regions` adds those that do.
     visible
         View index i -> (n, H, W) bool: does view j see the surface point that view i sees at this
         pixel? Only where it is known exactly (synthetic scenes).
@@ -154,6 +154,19 @@ class Scene:
         parts = [self.truth[self.ref].tobytes() if self.ref in self.truth else b""]
         parts += [name.encode() + mask.tobytes() for name, mask in sorted(self.regions.items())]
         return sha256(b"|".join(parts)).hexdigest()
+
+    @cached_property
+    def scored_regions(self) -> Mapping[str, NDArray[np.bool_]]:
+        """`regions`, and those over the views that this scene has (`matbench.regions.view_regions`).
+
+        The latter follow a choice of views; without ground truth of the reference view there are none.
+        """
+        from matbench.regions import view_regions
+
+        if self.ref not in self.truth:
+            return self.regions
+        over_views = view_regions(self.truth[self.ref], self.ref, self.n, self.visible.get(self.ref))
+        return _frozen_arrays({**self.regions, **over_views})
 
     def choose(self, indices: Sequence[int], name: str | None = None) -> "Scene":
         """The same scene seen by fewer views.

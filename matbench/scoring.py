@@ -71,7 +71,7 @@ def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFra
             continue
         scene = scenes[cell.scene]
         estimate, truth = store.disparity(cell)[scene.ref], scene.truth[scene.ref]
-        for region, mask in scene.regions.items():
+        for region, mask in scene.scored_regions.items():
             values = score(estimate, truth, mask, scene.pair_steps, used)
             head = (cell.method.algorithm, cell.method.changed, cell.scene, scene.labels[scene.ref], cell.seed, region)
             pixels = int((mask & np.isfinite(truth)).sum())

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from matbench.datasets.rendering import Column, Paint, Rectangle, Rig, Sphere
-from matbench.datasets.synthetic import SYNTHETIC, WORLDS, pattern
+from matbench.datasets.synthetic import SYNTHETIC, WORLDS
+from matbench.datasets.synthetic.rendering import Rig
+from matbench.datasets.synthetic.surfaces import Column, Paint, Rectangle, Sphere
+from matbench.datasets.synthetic.textures import pattern
 from matbench.errors import UserError
 from matbench.scene import Scene
 
