@@ -132,10 +132,10 @@ def _thin() -> Sequence[Surface]:
 
 
 def _fence() -> Sequence[Surface]:
-    """Periods of 8 px at depth 1.5: two view steps and more match one picket with its neighbours."""
-    period, wide, depth = 0.05, 0.026, 1.5
+    """Periods of 7.5 px at depth 1.5: two view steps and more match one picket with its neighbours."""
+    period, wide, depth = 0.047, 0.024, 1.5
     wood, dark = Paint((208, 186, 150), 12, 0.7, (0.1, 0.2)), Paint((120, 92, 70), 12, 0.7, (0.4, 0.7))
-    pickets = [_panel(-0.58 + k * period, -0.42, depth, (wide, 0.48), wood) for k in range(22)]
+    pickets = [_panel(-0.56 + k * period, -0.42, depth, (wide, 0.48), wood) for k in range(23)]
     rails = [_panel(-0.42, 0.14 + k * period, depth, (1.0, wide), dark) for k in range(6)]
     return [_wall(2.6, Paint((128, 156, 120), 26, 1.8)), *pickets, *rails]
 
