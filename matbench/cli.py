@@ -79,13 +79,16 @@ def compare(
     data: Data = None,
     out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,
     record: Annotated[bool, Parameter(negative="", help="Also write a recording of every cell for `view`.")] = False,
+    volumes: Annotated[
+        bool, Parameter(negative="", help="Also keep and score the volumes of methods that have one.")
+    ] = False,
     seed: Seeds = None,
     plugin: Plugins = None,
     metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1",
 ) -> int:
     """Run methods on scenes, score them, and write tables and a report.
 
-    Without arguments: all built-in methods on the synthetic scenes and on the paper's three where
+    Without arguments: all built-in methods on three synthetic scenes and on the paper's three where
     the data folder has them. The same line typed again takes up where it was interrupted.
 
     **Examples**
@@ -95,6 +98,10 @@ def compare(
     `matbench compare -a sgbm -a materiality -s middlebury2001/venus --data ~/stereo`
 
     `matbench compare -a 'okutomi_kanade[window=3,5,7]' -s 'synthetic/*' -m bad_2`
+
+    `matbench compare -a materiality -s synthetic/box -m surface_f_1`  scores of volumes, which are kept
+
+    `matbench compare -s 'synthetic/*[predict=right]' -m prediction_psnr`  predict the rightmost view, not given
     """
     from matbench import comparison
 
@@ -102,7 +109,14 @@ def compare(
     if scene is None:
         _say_missing(comparison.default_scenes(data)[1], data)
     ready = comparison.prepare(
-        algorithm, scene, data=data, out=out, record=record, seed=_whole(seed), plugin=plugin or ()
+        algorithm,
+        scene,
+        data=data,
+        out=out,
+        record=record,
+        volumes=volumes or _is_of_volumes(metric),
+        seed=_whole(seed),
+        plugin=plugin or (),
     )
     return _work(ready, metric)
 
@@ -145,7 +159,15 @@ def ablate(
         algorithms, listed = comparison.read_request(Path(selector))
         scene = scene or listed
     ablation.factors(methods(algorithms, plugin or ()))
-    ready = comparison.prepare(algorithms, scene, data=data, out=out, seed=_whole(seed), plugin=plugin or ())
+    ready = comparison.prepare(
+        algorithms,
+        scene,
+        data=data,
+        out=out,
+        volumes=_is_of_volumes(metric),
+        seed=_whole(seed),
+        plugin=plugin or (),
+    )
     return _work(ready, metric, is_ablation=True)
 
 
@@ -164,6 +186,12 @@ def _check_metric(metric: str) -> None:
     names = [m.name for m in scoring.metrics()]
     if metric not in names:
         raise unknown("metric", metric, names)
+
+
+def _is_of_volumes(metric: str) -> bool:
+    from matbench import scoring
+
+    return scoring.of_volumes(metric)
 
 
 def _work(ready: "Comparison", metric: str, is_ablation: bool = False) -> int:
@@ -203,7 +231,7 @@ def _run(ready: "Comparison", console: Console) -> bool:
 
     from matbench.run import pending
 
-    todo = len(pending(ready.plan, ready.store, ready.record))
+    todo = len(pending(ready.plan, ready.store, ready.record, ready.volumes))
     total = len(ready.plan.cells)
     if todo < total:
         console.print(f"{total - todo} of {total} cells are done already in {ready.folder}", highlight=False)

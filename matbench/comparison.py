@@ -41,6 +41,8 @@ class Comparison:
         Name -> scene, whole, for every scene of the plan.
     record
         Write a recording of every cell.
+    volumes
+        Keep the volumes of the methods that have one.
     command
         The line that asked for it, for the report.
     """
@@ -50,6 +52,7 @@ class Comparison:
     scenes: Mapping[str, Scene]
     data: Path | None
     record: bool
+    volumes: bool
     command: str
 
     @property
@@ -62,7 +65,15 @@ class Comparison:
         found = plugins.algorithms([Path(file) for file in self.plan.plugin_files])
         entries = [found[name].entry for name in sorted(names)]
         preload = [entry.module for entry in entries if not isinstance(entry, type)]
-        run.run(self.plan, self.store, data=self.data, record=self.record, preload=preload, listen=listen)
+        run.run(
+            self.plan,
+            self.store,
+            data=self.data,
+            record=self.record,
+            volumes=self.volumes,
+            preload=preload,
+            listen=listen,
+        )
 
     def tables(self) -> "tuple[pd.DataFrame, pd.DataFrame]":
         """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
@@ -190,6 +201,7 @@ def prepare(
     data: str | Path | None = None,
     out: str | Path | None = None,
     record: bool = False,
+    volumes: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     command: str | None = None,
@@ -209,15 +221,18 @@ def prepare(
     loaded: dict[tuple[str, str], Scene] = {}  # a scene spelled in two ways is one scene
     for name in names:
         scene = load_scene(name, root)
-        if scene.ref not in scene.truth:
-            raise UserError(f"{name} has no ground truth of its reference view {scene.labels[scene.ref]}: no scores")
+        if scene.ref not in scene.truth and scene.held_out is None:
+            ref = scene.labels[scene.ref]
+            raise UserError(
+                f"{name} has no ground truth of its reference view {ref}: only [predict=left] or [predict=right]"
+            )
         loaded.setdefault((scene.digest, scene.truth_digest), scene)
     by_name = {scene.name: scene for scene in loaded.values()}
     plan = make_plan(chosen, by_name, seeds, files)
     folder = Path(out) if out is not None else RUNS / plan.digest
     store = Store.open(folder, plan)
     said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
-    return Comparison(plan, store, by_name, root, record, said)
+    return Comparison(plan, store, by_name, root, record, volumes, said)
 
 
 def compare(
@@ -227,6 +242,7 @@ def compare(
     data: str | Path | None = None,
     out: str | Path | None = None,
     record: bool = False,
+    volumes: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
 ) -> "pd.DataFrame":
@@ -247,6 +263,8 @@ def compare(
         same request is resumed.
     record
         Also write a rerun recording of every cell, from a second, untimed solve.
+    volumes
+        Also keep the volume of every cell whose method has one, and score it.
     seed
         One seed or several.
     plugin
@@ -268,6 +286,7 @@ def compare(
         data=data,
         out=out,
         record=record,
+        volumes=volumes,
         seed=seed,
         plugin=plugin,
         command="matbench.compare(...)",

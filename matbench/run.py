@@ -26,12 +26,17 @@ def threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def pending(plan: Plan, store: Store, record: bool) -> list[Cell]:
-    """The cells that still have to be computed: those without a final outcome or a recording asked for."""
+def pending(plan: Plan, store: Store, record: bool, volumes: bool = False) -> list[Cell]:
+    """The cells that still have to be computed: those without a final outcome, or without what was asked for besides.
+
+    That is a recording, and the volume of a method that has one.
+    """
 
     def is_done(cell: Cell) -> bool:
         outcome = store.outcome(cell)
         if outcome is None or outcome.status not in FINAL:
+            return False
+        if volumes and outcome.has_volume and store.volume(cell) is None:
             return False
         return not (record and outcome.status == "ok") or (store.cell(cell) / "recording.rrd").exists()
 
@@ -72,6 +77,7 @@ def run(
     *,
     data: Path | None,
     record: bool = False,
+    volumes: bool = False,
     preload: Iterable[str] = (),
     listen: Listener | None = None,
 ) -> None:
@@ -90,7 +96,7 @@ def run(
         Told as each cell starts and ends.
     """
     tell = listen or (lambda *_: None)
-    todo = pending(plan, store, record)
+    todo = pending(plan, store, record, volumes)
     if not todo:
         return
     store.sweep()
@@ -100,7 +106,7 @@ def run(
         try:
             for cell in todo:
                 tell("start", cell, None)
-                job = Job(store.folder, cell, data, plan.plugin_files, threads(), record)
+                job = Job(store.folder, cell, data, plan.plugin_files, threads(), record, volumes)
                 outcome = _finish(pool, job, store)
                 tell("done", cell, outcome)
         except BaseException:

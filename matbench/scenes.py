@@ -6,11 +6,13 @@ from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from attrs import evolve
+
 from matbench import plugins
 from matbench.dataset import Dataset, Listing
 from matbench.errors import UserError, unknown
 from matbench.scene import Scene
-from matbench.spec import Spec, expand, parse
+from matbench.spec import Spec, expand, label, parse
 
 DATA_VARIABLE = "MATBENCH_DATA"
 
@@ -87,7 +89,8 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     Parameters
     ----------
     name
-        ``dataset/scene``, options in brackets; one value for each.
+        ``dataset/scene``, options in brackets; one value for each. Besides its dataset's own, every
+        scene has ``predict=left`` and ``predict=right``: that end view is held out.
     data
         The folder of real scenes; without it the one that MATBENCH_DATA names.
 
@@ -102,4 +105,13 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     prefix, slash, rest = specs[0].name.partition("/")
     if not slash or not rest:
         raise UserError(f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box'")
-    return _dataset(prefix).load(rest, specs[0].options, data_root(data))
+    options = dict(specs[0].options)
+    end = options.pop("predict", None)
+    scene = _dataset(prefix).load(rest, options, data_root(data))
+    if end is None:
+        return scene
+    from matbench.prediction import hold_out
+
+    full = parse(scene.name)[0]
+    name = label(full.name, dict(sorted({**full.options, "predict": end}.items())))
+    return evolve(hold_out(scene, end), name=name)
