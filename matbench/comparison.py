@@ -97,6 +97,9 @@ class Comparison:
         """Write ``report.html``."""
         from matbench.reports import page
 
+        curves = scoring.reliabilities(self.plan, self.store, self.scenes)
+        if len(curves):
+            write_text(self.folder / "reliability.csv", curves.to_csv(index=False))
         stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.cells}
         path = self.folder / "report.html"
 
@@ -118,6 +121,7 @@ class Comparison:
                 scenes=self.scenes,
                 facts=machine(),
                 ablation=ablation,
+                reliability=curves,
                 higher=frozenset(m.name for m in scoring.metrics() if m.better == "higher"),
             ),
         )

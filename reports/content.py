@@ -39,6 +39,8 @@ class Report:
         What it ran on, as shown: ``{"numpy": "2.4.1", "processor": ...}``.
     ablation
         What each factor does (`matbench.ablation.COLUMNS`), if that was asked for.
+    reliability
+        Reliability curves of the volumes that were kept (`matbench.scoring.reliabilities`).
     higher
         Metrics of which more is better; of all others, less is.
     """
@@ -51,6 +53,7 @@ class Report:
     scenes: Mapping[str, Scene] = field(factory=dict)
     facts: Mapping[str, str] = field(factory=dict)
     ablation: pd.DataFrame | None = None
+    reliability: pd.DataFrame | None = None
     higher: frozenset[str] = frozenset()
 
     def disparity(self, algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
