@@ -51,6 +51,7 @@ def render(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": False}  # columns are in the order of the regions
     environment.filters["breakable"] = _breakable
     return environment.get_template("report.html.j2").render(
         report=report,
