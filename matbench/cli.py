@@ -262,6 +262,8 @@ def _print_tables(results: Any, cells: Any, switches: Any, metric: str, console:
     from matbench.reports import switches as effects
     from matbench.reports import tables
 
+    if len(results) and metric not in set(results["metric"]):  # scenes without truth have predictions only
+        metric = results["metric"].iloc[0]
     higher = next(m.better for m in scoring.metrics() if m.name == metric) == "higher"
     for table in tables.terminal(results, cells, metric, higher, console.width):
         console.print(table)

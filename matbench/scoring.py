@@ -1,6 +1,6 @@
 """Tables of a run, computed from its stored maps: no method runs again for a new metric."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 
 import numpy as np
@@ -83,12 +83,11 @@ def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFra
         if outcome is None or outcome.status != "ok":
             continue
         scene = scenes[cell.scene]
-        estimate = store.disparity(cell)[scene.ref]
-        kept = store.volume(cell) if outcome.has_volume else None
-        for region, mask in scene.scored_regions.items():
-            rows += _in_region(cell, scene, region, mask, estimate, kept)
+        rows += _of_maps(cell, scene, store.disparity(cell)[scene.ref])
+        if outcome.has_volume:
+            rows += _of_volumes(cell, scene, store.volume(cell))
         if scene.held_out is not None:
-            rows += _predicted(cell, scene, estimate)
+            rows += _predicted(cell, scene, store.disparity(cell)[scene.ref])
     return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
 
 
@@ -96,24 +95,23 @@ def _head(cell: Cell, view: str, region: str) -> tuple[object, ...]:
     return cell.method.algorithm, cell.method.changed, cell.scene, view, cell.seed, region
 
 
-def _in_region(
-    cell: Cell,
-    scene: Scene,
-    region: str,
-    mask: NDArray[np.bool_],
-    estimate: NDArray[np.float32],
-    kept: StoredVolume | None,
-) -> list[tuple[object, ...]]:
-    head, truth = _head(cell, scene.labels[scene.ref], region), scene.truth[scene.ref]
-    of_maps = [metric for metric in metrics() if isinstance(metric, Metric)]
-    values = score(estimate, truth, mask, scene.pair_steps, of_maps)
-    pixels = int((mask & np.isfinite(truth)).sum())
-    rows: list[tuple[object, ...]] = [(*head, m.name, values[m.name], m.unit, pixels) for m in of_maps]
-    if kept is not None and scene.ref in kept.views:
-        rays = rays_of(kept, scene, mask)
-        of_volume = [metric for metric in metrics() if isinstance(metric, VolumeMetric)]
-        rows += [(*head, m.name, value_of(m, rays, pixels), m.unit, pixels) for m in of_volume]
-    return rows
+def _of_maps(cell: Cell, scene: Scene, estimate: NDArray[np.float32]) -> Iterator[tuple[object, ...]]:
+    used = [metric for metric in metrics() if isinstance(metric, Metric)]
+    for region, mask in scene.scored_regions.items():
+        truth, head = scene.truth[scene.ref], _head(cell, scene.labels[scene.ref], region)
+        values = score(estimate, truth, mask, scene.pair_steps, used)
+        pixels = int((mask & np.isfinite(truth)).sum())
+        yield from ((*head, m.name, values[m.name], m.unit, pixels) for m in used)
+
+
+def _of_volumes(cell: Cell, scene: Scene, kept: StoredVolume | None) -> Iterator[tuple[object, ...]]:
+    if kept is None or scene.ref not in kept.views or scene.ref not in scene.truth:
+        return
+    used = [metric for metric in metrics() if isinstance(metric, VolumeMetric)]
+    masks = scene.scored_regions
+    for region, rays in zip(masks, rays_of(kept, scene, masks.values()), strict=True):
+        head, pixels = _head(cell, scene.labels[scene.ref], region), len(rays.surface)
+        yield from ((*head, m.name, value_of(m, rays, pixels), m.unit, pixels) for m in used)
 
 
 def _predicted(cell: Cell, scene: Scene, estimate: NDArray[np.float32]) -> list[tuple[object, ...]]:
@@ -134,7 +132,8 @@ def reliabilities(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.D
         kept = store.volume(cell) if outcome is not None and outcome.has_volume else None
         if kept is None or scene.ref not in kept.views or scene.ref not in scene.truth:
             continue
-        curve = reliability(rays_of(kept, scene, np.isfinite(scene.truth[scene.ref])))
+        (rays,) = rays_of(kept, scene, [np.isfinite(scene.truth[scene.ref])])
+        curve = reliability(rays)
         names = {"algorithm": cell.method.algorithm, "params": cell.method.changed}
         curves.append(pd.DataFrame({**names, "scene": cell.scene, "seed": cell.seed}, index=curve.index).join(curve))
     columns = ["algorithm", "params", "scene", "seed", "materiality", "observed", "points"]

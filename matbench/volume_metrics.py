@@ -45,7 +45,7 @@ def _material(rays: Rays) -> NDArray[np.bool_]:
 
 def _right_and_wrong(rays: Rays, tolerance: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(rays, planes) material points near the surface, and those where nothing is."""
-    before, material = rays.before_surface(), _material(rays)
+    before, material = rays.before_surface, _material(rays)
     return material & (np.abs(before) <= tolerance + TIE), material & (before > tolerance + TIE)
 
 
@@ -65,8 +65,9 @@ def recall(rays: Rays, tolerance: float) -> float:
 
 def f_score(rays: Rays, tolerance: float) -> float:
     """Harmonic mean of precision and recall; 0 where nothing is found."""
-    found = recall(rays, tolerance)
-    return 2 / (1 / precision(rays, tolerance) + 1 / found) if found else 0.0
+    right, wrong = _right_and_wrong(rays, tolerance)
+    found = right.any(axis=1).mean()
+    return 200 / float(1 + wrong.sum() / right.sum() + 1 / found) if found else 0.0
 
 
 def outcomes(rays: Rays) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

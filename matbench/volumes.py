@@ -1,6 +1,8 @@
 """Volumes as a run keeps them: 256 levels, and read along the rays of a view."""
 
 import zipfile
+from collections.abc import Iterable, Iterator
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -110,15 +112,17 @@ class Rays:
     materiality: NDArray[np.float32]
     surface: NDArray[np.float64]
 
+    @cached_property
     def before_surface(self) -> NDArray[np.float64]:
         """(rays, planes) planes by which each point lies before the true surface; negative behind it."""
         places: NDArray[np.float64] = np.arange(self.materiality.shape[1]) - self.surface[:, None]
         return places
 
 
-def rays_of(stored: StoredVolume, scene: Scene, mask: NDArray[np.bool_]) -> Rays:
-    """The rays of the reference view's pixels in a region, where truth is known."""
+def rays_of(stored: StoredVolume, scene: Scene, masks: Iterable[NDArray[np.bool_]]) -> Iterator[Rays]:
+    """Region by region, the rays of the reference view's pixels where truth is known."""
     surface = stored.true_planes(scene)
-    chosen = mask & np.isfinite(surface)
-    levels = stored.rays(scene.ref).transpose(0, 2, 1)[chosen]
-    return Rays(levels.astype(np.float32) / np.float32(_LEVELS), surface[chosen])
+    levels = np.ascontiguousarray(stored.rays(scene.ref).transpose(0, 2, 1))
+    for mask in masks:
+        chosen = mask & np.isfinite(surface)
+        yield Rays(levels[chosen] * np.float32(1 / _LEVELS), surface[chosen])

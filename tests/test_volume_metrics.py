@@ -7,7 +7,7 @@ import pytest
 from attrs import evolve
 
 from matbench.datasets.synthetic import SYNTHETIC, materiality
-from matbench.scene import Range
+from matbench.scene import Range, Scene
 from matbench.space import DisparitySpace, Volume, surface
 from matbench.volume_metrics import (
     METRICS,
@@ -25,6 +25,12 @@ SMALL = {"size": "96x72"}
 
 def _rays(surface_planes: list[float], *rows: list[float]) -> Rays:
     return Rays(np.array(rows, np.float32), np.array(surface_planes, float))
+
+
+def _along(stored: StoredVolume, scene: Scene) -> Rays:
+    """The rays of all known pixels."""
+    (rays,) = rays_of(stored, scene, [np.ones((scene.height, scene.width), bool)])
+    return rays
 
 
 @pytest.fixture(scope="module")
@@ -113,14 +119,13 @@ def test_what_lies_behind_the_surface_does_not_count() -> None:
 def test_exact_materialities_are_perfect_and_shifted_ones_are_not(exact: tuple[Volume, StoredVolume]) -> None:
     volume, stored = exact
     scene = SYNTHETIC.load("box", SMALL, None)
-    everywhere = np.ones((scene.height, scene.width), bool)
-    rays = rays_of(stored, scene, everywhere)
+    rays = _along(stored, scene)
     assert rays.materiality.shape == (scene.height * scene.width, volume.space.planes)
     assert recall(rays, 1) == 100
     assert precision(rays, 1) > 98, "but for what only another view's rays meet at the edges"
     assert brier(rays) < 0.01
     shifted = Volume(volume.space, np.roll(volume.values, 4, axis=1), volume.views)  # four planes nearer
-    wrong = rays_of(StoredVolume.of(shifted), scene, everywhere)
+    wrong = _along(StoredVolume.of(shifted), scene)
     assert f_score(wrong, 1) < 15
     assert brier(wrong) > 10 * brier(rays)
 
@@ -133,7 +138,7 @@ def test_the_truth_is_found_in_a_volume_over_fewer_views_and_finer_planes() -> N
     known = np.full((scene.height, space.samples), np.nan, np.float32)
     known[:, :: space.fineness] = wide
     stored = StoredVolume.of(surface(space, {1: known}, (0, 2, 4)))
-    rays = rays_of(stored, scene, np.ones(wide.shape, bool))
+    rays = _along(stored, scene)
     assert recall(rays, 0.5) == precision(rays, 0.5) == 100
     tied = rays.surface % 1 == 0.5  # midway between two planes, where either is nearest
     assert tied.mean() < 0.01
@@ -185,6 +190,6 @@ def test_unknown_truth_does_not_count(exact: tuple[Volume, StoredVolume]) -> Non
     truth = scene.truth[2].copy()
     truth[:, 40:] = np.nan
     half = evolve(scene, truth={2: truth})
-    rays = rays_of(exact[1], half, np.ones(truth.shape, bool))
+    rays = _along(exact[1], half)
     assert len(rays.surface) == 40 * scene.height
     assert np.isfinite(rays.surface).all()
