@@ -13,6 +13,7 @@ import matbench
 from matbench.datasets.synthetic import SYNTHETIC
 from matbench.errors import UserError
 from matbench.prediction import coverage, differences, hold_out, predict, psnr
+from matbench.regions import REGIONS
 from matbench.scene import Scene
 from matbench.warping import TEAR, carry
 from matbench.worker import hide_truth
@@ -118,6 +119,8 @@ def test_methods_do_not_see_the_view_and_its_truth(scene: Scene) -> None:
     assert (held.held_out.label, held.held_out.steps) == ("4", 2)
     np.testing.assert_array_equal(held.held_out.image, scene.views[4])
     assert hide_truth(held).held_out is None
+    assert held.scored_regions.keys() == REGIONS.keys()
+    assert not hide_truth(held).scored_regions
     other = evolve(held, held_out=evolve(held.held_out, image=255 - held.held_out.image))
     assert other.digest == held.digest, "methods see the same"
     assert other.truth_digest != held.truth_digest, "but are not scored by the same"
