@@ -237,7 +237,8 @@ def test_predictions_are_scored_with_and_without_truth(tmp_path: Path) -> None:
     alone, _ = ready.tables()
     assert set(alone.metric) == {"prediction_psnr", "prediction_coverage"}
     assert _rows(alone, "prediction_psnr")["flat"] == by_params["flat", "value=2.0"]
-    assert ready.report(alone, pd.read_csv(tmp_path / "blind" / "cells.csv", keep_default_na=False)).exists()
+    page = ready.report(alone, pd.read_csv(tmp_path / "blind" / "cells.csv", keep_default_na=False))
+    assert "There is no ground truth" in page.read_text()
 
 
 def test_a_method_too_large_for_the_warm_up_still_competes(tmp_path: Path) -> None:
