@@ -90,13 +90,16 @@ def compare(
     out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,
     record: Annotated[bool, Parameter(negative="", help="Also write a recording of every cell for `view`.")] = False,
     row: Annotated[str | None, Parameter(help="Image row of the recordings' slices; default the middle one.")] = None,
+    volumes: Annotated[
+        bool, Parameter(negative="", help="Also keep and score the volumes of methods that have one.")
+    ] = False,
     seed: Seeds = None,
     plugin: Plugins = None,
     metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1",
 ) -> int:
     """Run methods on scenes, score them, and write tables and a report.
 
-    Without arguments: all built-in methods on the synthetic scenes and on the paper's three where
+    Without arguments: all built-in methods on three synthetic scenes and on the paper's three where
     the data folder has them. The same line typed again takes up where it was interrupted.
 
     **Examples**
@@ -111,6 +114,12 @@ def compare(
     as wide as they fit, `baseline=N` how many view steps apart the outermost are:
 
     `matbench compare -a okutomi_kanade -s 'middlebury2003/teddy[views=3 baseline=2,4,6]' --data DATA`
+
+    Scores of volumes, which are kept; and of predictions of the rightmost view, which is not given:
+
+    `matbench compare -a materiality -s synthetic/box -m surface_f_1`
+
+    `matbench compare -s 'synthetic/*[predict=right]' -m prediction_psnr`
     """
     from matbench import comparison
 
@@ -125,9 +134,10 @@ def compare(
         data=data,
         out=out,
         record=record,
+        row=None if row is None else _whole("row", row),
+        volumes=volumes or _is_of_volumes(metric),
         seed=[_whole("seed", one) for one in seed or ("0",)],
         plugin=plugin or (),
-        row=None if row is None else _whole("row", row),
     )
     return _work(ready, metric)
 
@@ -174,8 +184,15 @@ def ablate(
         scene = scene or listed
     chosen = methods(algorithms, plugin or ())
     ablation.check_varies(chosen, scene or ())
-    seeds = [_whole("seed", one) for one in seed or ("0",)]
-    ready = comparison.prepare(algorithms, scene, data=data, out=out, seed=seeds, plugin=plugin or ())
+    ready = comparison.prepare(
+        algorithms,
+        scene,
+        data=data,
+        out=out,
+        volumes=_is_of_volumes(metric),
+        seed=[_whole("seed", one) for one in seed or ("0",)],
+        plugin=plugin or (),
+    )
     return _work(ready, metric, is_ablation=any(ablation.factors(chosen).values()))
 
 
@@ -193,6 +210,12 @@ def _check_metric(metric: str) -> None:
     names = [m.name for m in scoring.metrics()]
     if metric not in names:
         raise unknown("metric", metric, names)
+
+
+def _is_of_volumes(metric: str) -> bool:
+    from matbench import scoring
+
+    return scoring.of_volumes(metric)
 
 
 def _work(ready: "Comparison", metric: str, is_ablation: bool = False) -> int:
@@ -238,7 +261,7 @@ def _run(ready: "Comparison", console: Console) -> bool:
 
     from matbench.run import pending
 
-    todo = len(pending(ready.plan, ready.store, ready.record, ready.row))
+    todo = len(pending(ready.plan, ready.store, ready.record, ready.row, ready.volumes))
     total = len(ready.plan.cells)
     if todo < total:
         console.print(f"{total - todo} of {total} cells are done already in {ready.folder}", highlight=False)
@@ -269,6 +292,8 @@ def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: 
     from matbench.reports import curves, tables
     from matbench.reports import switches as effects
 
+    if len(results) and metric not in set(results["metric"]):  # scenes without truth have predictions only
+        metric = results["metric"].iloc[0]
     higher = next(m.better for m in scoring.metrics() if m.name == metric) == "higher"
     for table in tables.terminal(results, cells, metric, higher, console.width):
         console.print(table)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from matbench.sweeps import Sweep
 
+SYNTHETIC_SCENES = ("synthetic/box", "synthetic/curved", "synthetic/weak")
 RUNS = Path("runs")
 
 
@@ -39,12 +40,14 @@ class Comparison:
     ----------
     scenes
         Name -> scene, whole, for every scene of the plan.
-    record
-        Write a recording of every cell.
     command
         The line that asked for it, for the report.
+    record
+        Write a recording of every cell.
     row
         The image row that recordings show; the middle one of each scene if None.
+    volumes
+        Keep the volumes of the methods that have one.
     left_out
         Why -> scenes that a pattern means but that cannot be compared.
     """
@@ -53,9 +56,10 @@ class Comparison:
     store: Store
     scenes: Mapping[str, Scene]
     data: Path | None
-    record: bool
     command: str
+    record: bool = False
     row: int | None = None
+    volumes: bool = False
     left_out: Mapping[str, Sequence[str]] = {}
 
     @property
@@ -68,7 +72,16 @@ class Comparison:
         found = plugins.algorithms([Path(file) for file in self.plan.plugin_files])
         entries = [found[name].entry for name in sorted(names)]
         preload = [entry.module for entry in entries if not isinstance(entry, type)]
-        run.run(self.plan, self.store, data=self.data, record=self.record, row=self.row, preload=preload, listen=listen)
+        run.run(
+            self.plan,
+            self.store,
+            data=self.data,
+            record=self.record,
+            row=self.row,
+            volumes=self.volumes,
+            preload=preload,
+            listen=listen,
+        )
 
     def tables(self) -> "tuple[pd.DataFrame, pd.DataFrame]":
         """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
@@ -107,6 +120,9 @@ class Comparison:
         """Write ``report.html``."""
         from matbench.reports import page
 
+        reliability = scoring.reliabilities(self.plan, self.store, self.scenes)
+        if len(reliability):
+            write_text(self.folder / "reliability.csv", reliability.to_csv(index=False))
         stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.cells}
         path = self.folder / "report.html"
 
@@ -129,6 +145,7 @@ class Comparison:
                 facts=machine(),
                 ablation=ablation,
                 sweeps=tuple(sweeps),
+                reliability=reliability,
                 higher=frozenset(m.name for m in scoring.metrics() if m.better == "higher"),
             ),
         )
@@ -162,10 +179,10 @@ def default_algorithms() -> list[str]:
 
 
 def default_scenes(data: str | Path | None = None) -> tuple[list[str], list[str]]:
-    """The built-in synthetic scenes and the paper's three: those that are present, and those missing."""
+    """Three synthetic scenes and the paper's three: those that are present, and those missing."""
     known = listings(data)
     present = {name for name, listing in known.items() if isinstance(listing, Listing) and listing.present}
-    synthetic = [name for name in known if name.startswith("synthetic/") and name in present]
+    synthetic = [name for name in SYNTHETIC_SCENES if name in present]
     paper = [name for name in PAPER_SCENES if name in present]
     return synthetic + paper, [name for name in PAPER_SCENES if name not in present]
 
@@ -212,6 +229,7 @@ def prepare(
     data: str | Path | None = None,
     out: str | Path | None = None,
     record: bool = False,
+    volumes: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     command: str | None = None,
@@ -241,8 +259,11 @@ def prepare(
                 raise
             left_out.setdefault("the scenes have not these views", []).append(name)
             continue
-        if scene.ref not in scene.truth:
-            raise UserError(f"{name} has no ground truth of its reference view {scene.labels[scene.ref]}: no scores")
+        if scene.ref not in scene.truth and scene.held_out is None:
+            ref = scene.labels[scene.ref]
+            raise UserError(
+                f"{name} has no ground truth of its reference view {ref}: only [predict=left] or [predict=right]"
+            )
         if row is not None and not 0 <= row < scene.height:
             raise UserError(f"row {row} of {name}: 0 to {scene.height - 1} is possible")
         kept = loaded.setdefault((scene.digest, scene.truth_digest), scene)
@@ -255,7 +276,7 @@ def prepare(
     folder = Path(out) if out is not None else RUNS / plan.digest
     store = Store.open(folder, plan)
     said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
-    return Comparison(plan, store, by_name, root, record, said, row, left_out)
+    return Comparison(plan, store, by_name, root, said, record, row, volumes, left_out)
 
 
 def compare(
@@ -265,6 +286,7 @@ def compare(
     data: str | Path | None = None,
     out: str | Path | None = None,
     record: bool = False,
+    volumes: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     row: int | None = None,
@@ -278,7 +300,7 @@ def compare(
         methods, and those of `plugin`, if not given.
     scenes
         Selectors such as ``"synthetic/*"`` or ``"middlebury2003/teddy[views=0:9:2]"``; the
-        synthetic scenes and the paper's three where they are present, if not given.
+        default synthetic scenes (box, curved, weak) and the paper's three where they are present, if not given.
     data
         The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
     out
@@ -286,6 +308,8 @@ def compare(
         same request is resumed.
     record
         Also write a rerun recording of every cell, from a second, untimed solve.
+    volumes
+        Also keep the volume of every cell whose method has one, and score it.
     seed
         One seed or several.
     plugin
@@ -309,6 +333,7 @@ def compare(
         data=data,
         out=out,
         record=record,
+        volumes=volumes,
         seed=seed,
         plugin=plugin,
         command="matbench.compare(...)",

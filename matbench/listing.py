@@ -1,4 +1,4 @@
-"""What `matbench list` shows: methods with parameters, scenes with sizes, metrics."""
+"""What `matbench list` shows: methods with parameters, scenes with sizes, metrics, regions."""
 
 import inspect
 from collections.abc import Sequence
@@ -10,12 +10,13 @@ from rich.table import Column, Table
 
 from matbench import plugins, scoring, spec
 from matbench.errors import UserError
+from matbench.regions import REGIONS
 from matbench.scenes import listings
 
 OPTIONS = """\
 In brackets after a real or synthetic scene: views=3 (that many, as wide as they fit), views=0:9:2 or views=2+4+6 \
 (by their labels), baseline=4 (view steps from the first to the last), ref=2 (the view to score), \
-disparities=0:21 (to search, pixels of the pair), size=half."""
+disparities=0:21 (to search, pixels of the pair), size=half, predict=right (that end view is held out)."""
 
 
 def known(data: Path | None = None, files: Sequence[Path] = ()) -> dict[str, Any]:
@@ -25,6 +26,7 @@ def known(data: Path | None = None, files: Sequence[Path] = ()) -> dict[str, Any
         "scenes": {name: _scene(found) for name, found in listings(data).items()},
         "metrics": {m.name: {"unit": m.unit, "better": m.better, "about": m.about} for m in scoring.metrics()}
         | {name: {"error": error} for name, error in scoring.broken_metrics().items()},
+        "regions": REGIONS,
     }
 
 
@@ -98,7 +100,10 @@ def tables(everything: dict[str, Any]) -> list[Table]:
             metrics.add_row(escape(name), "", "", f"[red]{escape(facts['error'])}[/]")
             continue
         metrics.add_row(escape(name), facts["unit"], facts["better"], escape(facts["about"]))
-    return [methods, scenes, metrics]
+    regions = Table("region", "which pixels of the reference view", title="Regions", title_justify="left")
+    for name, about in everything["regions"].items():
+        regions.add_row(name, about)
+    return [methods, scenes, metrics, regions]
 
 
 def _shown(value: Any) -> str:

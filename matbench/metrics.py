@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable, Iterable
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from attrs import frozen
@@ -168,15 +168,15 @@ def score(
         raise ValueError(f"estimate is {estimate.shape}, truth {truth.shape}, region {mask.shape}: they must agree")
     errors = error_map(estimate, truth, pair_steps)[mask & np.isfinite(truth)]
     errors.setflags(write=False)
-    return {metric.name: _value(metric, errors) for metric in metrics}
+    return {metric.name: value_of(metric, errors, errors.size) for metric in metrics}
 
 
-def _value(metric: Metric, errors: Errors) -> float:
-    """NaN for an empty region, and for a plug-in's metric that fails: it harms no other."""
-    if not errors.size:
+def value_of(metric: Any, argument: Any, pixels: int) -> float:
+    """A metric's value; NaN for an empty region, and for a plug-in's metric that fails: it harms no other."""
+    if not pixels:
         return float("nan")
     try:
-        return float(metric.compute(errors))
+        return float(metric.compute(argument))
     except Exception as error:
         warnings.warn(f"metric {metric.name} failed: {type(error).__name__}: {error}", stacklevel=3)
         return float("nan")

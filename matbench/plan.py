@@ -12,7 +12,7 @@ from matbench import plugins, spec
 from matbench.errors import UserError
 from matbench.scene import Scene
 
-SCHEMA = 1  # of cells and their keys; a change of what is stored makes all of them anew
+SCHEMA = 2  # of cells and their keys; a change of what is stored makes all of them anew
 
 
 def digest(value: Any) -> str:

@@ -209,10 +209,10 @@ class _Writer:
             colors = coloring.truth_colors(truth, self.ends)
             self.picture("truth", "disparity", picture=colors)
             contents.truth = True
-        if scene.regions:
+        if scene.scored_regions:
             marked = [(0, "outside", (0, 0, 0, 0)), (1, "inside", (230, 159, 0, 255))]
             self.log("regions", what=rr.AnnotationContext(marked))
-        for name, mask in scene.regions.items():
+        for name, mask in scene.scored_regions.items():
             inside = rr.SegmentationImage(mask[::step, ::step].astype(np.uint8), opacity=0.6)
             contents.regions.append(self.log("regions", name, what=inside))
 

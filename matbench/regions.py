@@ -1,6 +1,6 @@
 """Regions of the reference view, from images and ground truth alone.
 
-They follow Scharstein & Szeliski 2002 and the masks of the Middlebury evaluation that came of it.
+Those of the field's pair follow Scharstein & Szeliski 2002 and the masks of the Middlebury evaluation that came of it.
 What the paper leaves open was settled by the occluded part of those masks (intersection over
 union 0.993, 0.920 and 0.953 on Tsukuba, Venus and Teddy) and of their discontinuities (0.998,
 0.962, 0.943), by one rule for all scenes.
@@ -25,6 +25,22 @@ TEXTURE, TEXTURE_WIDTH = 4.0, 3
 _ROUNDING = 1e-4  # px: as for the scores, float32 rounding does not decide a tie
 
 Mask = NDArray[np.bool_]
+
+PAIR_REGIONS = {
+    "all": "truth is known",
+    "nonocc": "the pair's other view sees it",
+    "occ": "the pair's other view does not see it",
+    "disc": "of nonocc, near a depth jump",
+    "textureless": "of nonocc, hardly any horizontal gradient",
+}
+VIEW_REGIONS = {
+    "seen_in_all": "every view sees it",
+    "half_occluded": "at least one other view sees it, from at least one a nearer surface hides it",
+    "out_of_frame": "at least one other view sees it, nothing hides it, some views' frames end before it",
+    "seen_once": "no other view sees it",
+}
+REGIONS = PAIR_REGIONS | VIEW_REGIONS
+"""Name -> what it holds, in one line."""
 
 
 def regions(
@@ -92,6 +108,47 @@ def seen_from(truth: NDArray[np.float32], steps: float) -> Mask:
     seen = np.zeros((height, width), bool)
     seen[rows, columns] = disparity >= front[rows, target] - OCCLUSION_TOLERANCE - _ROUNDING
     return seen
+
+
+def view_regions(truth: NDArray[np.float32], ref: int, count: int, seen: Mask | None = None) -> Mapping[str, Mask]:
+    """How many of the used views see a pixel's point, and why the others do not.
+
+    Every pixel of known truth is in exactly one of the four. The paper's semi-occlusion (its
+    frustum test alone fails somewhere) is ``out_of_frame``; what its product over nearer points
+    must find out is ``half_occluded``; in ``seen_once`` nothing can be matched. With two views
+    ``seen_in_all`` and ``seen_once`` are all there is.
+
+    Parameters
+    ----------
+    truth
+        (H, W) float32, pixels per view step, NaN where unknown.
+    ref, count
+        Which of how many views that is.
+    seen
+        (count, H, W) bool, whether each view sees the point, where that is known exactly; by
+        default `seen_from` decides, with its tolerance of a pixel between the two views: a strip
+        that is narrower than that is not found, and what has no known truth hides nothing. A
+        point inside the frame's columns that a view does not see counts as hidden.
+
+    Returns
+    -------
+    Name -> (H, W) bool, in the order of `VIEW_REGIONS`.
+    """
+    known, columns = np.isfinite(truth), np.arange(truth.shape[1])
+    places = np.where(known, truth, 0).astype(np.float64)
+    seen_by, hidden_from, left = (np.zeros(truth.shape, np.intp) for _ in range(3))
+    for view in range(count):
+        if view == ref:
+            continue
+        place = np.floor(columns - (view - ref) * places + 0.5)
+        inside = (place >= 0) & (place < truth.shape[1])
+        sees = seen_from(truth, view - ref) if seen is None else seen[view]
+        seen_by += sees
+        hidden_from += inside & ~sees
+        left += ~inside & ~sees
+    once, hidden = seen_by == 0, hidden_from > 0
+    masks = (~once & ~hidden & (left == 0), ~once & hidden, ~once & ~hidden & (left > 0), once)
+    return {name: known & mask for name, mask in zip(VIEW_REGIONS, masks, strict=True)}
 
 
 def near_jumps(disparity: NDArray[np.float32], occluded: Mask) -> Mask:

@@ -26,15 +26,19 @@ def threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def pending(plan: Plan, store: Store, record: bool, row: int | None = None) -> list[Cell]:
-    """The cells that still have to be computed: those without a final outcome or a recording asked for.
+def pending(
+    plan: Plan, store: Store, record: bool = False, row: int | None = None, volumes: bool = False
+) -> list[Cell]:
+    """The cells that still have to be computed: those without a final outcome, or without what was asked for besides.
 
-    A recording that shows another row than `row` is made anew.
+    That is a recording that shows `row`, and the volume of a method that has one.
     """
 
     def is_done(cell: Cell) -> bool:
         outcome = store.outcome(cell)
         if outcome is None or outcome.status not in FINAL:
+            return False
+        if volumes and outcome.has_volume and store.volume(cell) is None:
             return False
         if not record or outcome.status != "ok":
             return True
@@ -78,6 +82,7 @@ def run(
     data: Path | None,
     record: bool = False,
     row: int | None = None,
+    volumes: bool = False,
     preload: Iterable[str] = (),
     listen: Listener | None = None,
 ) -> None:
@@ -98,7 +103,7 @@ def run(
         Told as each cell starts and ends.
     """
     tell = listen or (lambda *_: None)
-    todo = pending(plan, store, record, row)
+    todo = pending(plan, store, record, row, volumes)
     if not todo:
         return
     store.sweep()
@@ -108,7 +113,7 @@ def run(
         try:
             for cell in todo:
                 tell("start", cell, None)
-                job = Job(store.folder, cell, data, plan.plugin_files, threads(), record, row)
+                job = Job(store.folder, cell, data, plan.plugin_files, threads(), record, row, volumes)
                 outcome = _finish(pool, job, store)
                 tell("done", cell, outcome)
         except BaseException:

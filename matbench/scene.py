@@ -63,6 +63,25 @@ def _frozen_arrays(arrays: Mapping[Any, NDArray[Any]]) -> Mapping[Any, NDArray[A
 
 
 @frozen(eq=False)
+class HeldOut:
+    """A view that methods are not given, to be predicted.
+
+    Parameters
+    ----------
+    label
+        What it is called on disk.
+    steps
+        View steps from the reference view to it; negative if it is to the left.
+    image
+        (H, W, 3) uint8, RGB.
+    """
+
+    label: str
+    steps: float
+    image: NDArray[np.uint8] = field(converter=_frozen_array)
+
+
+@frozen(eq=False)
 class Scene:
     """n rectified views taken at even steps along a line, and ground truth for some of them.
 
@@ -88,10 +107,12 @@ class Scene:
         thresholds; errors are multiplied by it before they meet a threshold.
     regions
         Name -> (H, W) bool mask of the reference view. They come from the full scene and do not
-        change when views are chosen.
+        change when views are chosen; `scored_regions` adds those that do.
     visible
         View index i -> (n, H, W) bool: does view j see the surface point that view i sees at this
         pixel? Only where it is known exactly (synthetic scenes).
+    held_out
+        A further view that is to be predicted, if that was asked for (`matbench.prediction`).
 
     Raises
     ------
@@ -108,6 +129,7 @@ class Scene:
     pair_steps: float
     regions: Mapping[str, NDArray[np.bool_]] = field(converter=_frozen_arrays, factory=dict)
     visible: Mapping[int, NDArray[np.bool_]] = field(converter=_frozen_arrays, factory=dict)
+    held_out: HeldOut | None = None
 
     def __attrs_post_init__(self) -> None:
         shape = self.views.shape
@@ -132,6 +154,9 @@ class Scene:
             if seen.shape != shape[:3] or seen.dtype != np.bool_:
                 found = f"{seen.shape} {seen.dtype}"
                 raise SceneError(f"{self.name}: visibility of view {view} is {found}, not {shape[:3]} bool")
+        if self.held_out is not None and self.held_out.image.shape != shape[1:]:
+            size = self.held_out.image.shape
+            raise SceneError(f"{self.name}: view {self.held_out.label}, held out, is {size}, not {shape[1:]}")
 
     @property
     def n(self) -> int:
@@ -154,10 +179,25 @@ class Scene:
 
     @cached_property
     def truth_digest(self) -> str:
-        """SHA-256 of everything the scorer adds: the reference view's truth and its regions."""
+        """SHA-256 of everything the scorer adds: the reference view's truth, its regions, the view held out."""
         parts = [self.truth[self.ref].tobytes() if self.ref in self.truth else b""]
         parts += [name.encode() + mask.tobytes() for name, mask in sorted(self.regions.items())]
+        if self.held_out is not None:
+            parts.append(f"{self.held_out.label} {self.held_out.steps!r}".encode() + self.held_out.image.tobytes())
         return sha256(b"|".join(parts)).hexdigest()
+
+    @cached_property
+    def scored_regions(self) -> Mapping[str, NDArray[np.bool_]]:
+        """`regions`, and those over the views that this scene has (`matbench.regions.view_regions`).
+
+        The latter follow a choice of views; without ground truth of the reference view there are none.
+        """
+        from matbench.regions import view_regions
+
+        if self.ref not in self.truth:
+            return self.regions
+        over_views = view_regions(self.truth[self.ref], self.ref, self.n, self.visible.get(self.ref))
+        return _frozen_arrays({**self.regions, **over_views})
 
     def choose(self, indices: Sequence[int], name: str | None = None) -> "Scene":
         """The same scene seen by fewer views.
@@ -196,6 +236,7 @@ class Scene:
             truth={place[i]: truth * np.float32(step) for i, truth in self.truth.items() if i in place},
             pair_steps=self.pair_steps / step,
             visible={place[i]: seen[kept] for i, seen in self.visible.items() if i in place},
+            held_out=self.held_out and evolve(self.held_out, steps=self.held_out.steps / step),
         )
 
     def widest(self, count: int) -> tuple[int, ...]:

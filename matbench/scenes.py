@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from matbench import plugins
 from matbench.dataset import Dataset, Listing
 from matbench.errors import UserError, unknown
 from matbench.scene import Scene
-from matbench.spec import Spec, expand, parse
+from matbench.spec import Spec, expand, label, parse
 
 DATA_VARIABLE = "MATBENCH_DATA"
 PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
@@ -94,7 +94,8 @@ def group(name: str, known: Iterable[str]) -> list[str]:
 def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Selection:
     """The scenes that selectors mean; patterns match scenes that are present and have truth.
 
-    A pattern with a size takes the scenes that are present in it.
+    A pattern with a size takes the scenes that are present in it, one with ``predict`` also those
+    without truth.
 
     Raises
     ------
@@ -110,10 +111,9 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Se
             continue
         known = known if known is not None else listings(data)
         hits = group(spec.name, known)
-        size = spec.options.get("size")
         offered = {name: found for name in hits if isinstance(found := known[name], Listing)}
         present = {name: found for name, found in offered.items() if found.present or found.complete}
-        why = {name: _unfit(found, size) for name, found in present.items()}
+        why = {name: _unfit(found, spec.options) for name, found in present.items()}
         fit = [name for name, reason in why.items() if not reason]
         if not fit:
             raise _no_match(spec, hits, why)
@@ -124,9 +124,10 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Se
     return Selection(tuple(names), left_out)
 
 
-def _unfit(listing: Listing, size: str | None) -> str:
-    """Why a scene cannot be compared in that size; empty if it can."""
-    if not listing.truth:
+def _unfit(listing: Listing, options: Mapping[str, str]) -> str:
+    """Why a scene cannot be compared with those options; empty if it can."""
+    size = options.get("size")
+    if not listing.truth and "predict" not in options:
         return _NO_TRUTH
     if size is None or listing.complete is None:
         return "" if listing.present else "not complete"
@@ -157,7 +158,8 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     Parameters
     ----------
     name
-        ``dataset/scene``, options in brackets; one value for each.
+        ``dataset/scene``, options in brackets; one value for each. Besides its dataset's own, every
+        scene has ``predict=left`` and ``predict=right``: that end view is held out.
     data
         The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
 
@@ -172,4 +174,13 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     prefix, slash, rest = specs[0].name.partition("/")
     if not slash or not rest:
         raise UserError(f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box'")
-    return _dataset(prefix).load(rest, specs[0].options, data_root(data))
+    options = dict(specs[0].options)
+    end = options.pop("predict", None)
+    scene = _dataset(prefix).load(rest, options, data_root(data))
+    if end is None:
+        return scene
+    from matbench.prediction import hold_out
+
+    full = parse(scene.name)[0]
+    name = label(full.name, dict(sorted({**full.options, "predict": end}.items())))
+    return evolve(hold_out(scene, end), name=name)

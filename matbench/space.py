@@ -1,5 +1,6 @@
 """Disparity space: planes x rows x columns of target points (SPEC 1), and volumes over it."""
 
+from collections.abc import Mapping
 from math import ceil, floor
 
 import numpy as np
@@ -140,3 +141,27 @@ def visibility(volume: Volume, view: int) -> NDArray[np.float32]:
         seen[:, plane, ray] = through
         through *= 1 - volume.values[:, plane, ray]
     return seen
+
+
+def surface(space: DisparitySpace, maps: Mapping[int, NDArray[np.float32]], views: tuple[int, ...]) -> Volume:
+    """The materialities of known surfaces: 1 in the plane nearest to what a ray meets first, else 0.
+
+    Every view with a map marks one target point on each of its rays, so that what several views
+    see is marked by each; a slanted surface is as thick as its rays disagree. What no view sees is
+    not marked.
+
+    Parameters
+    ----------
+    maps
+        View of the space -> (rows, samples) disparities at its samples, pixels per view step of
+        the space; NaN and what lies beyond the planes marks nothing.
+    views
+        Which of the scene's views the space spans.
+    """
+    values = np.zeros(space.shape, np.float32)
+    for view, disparity in maps.items():
+        plane = np.round(disparity.astype(np.float64) * space.fineness) - space.first
+        rows, samples = np.nonzero((plane >= 0) & (plane < space.planes))
+        planes = plane[rows, samples].astype(np.intp)
+        values[rows, planes, samples + view * (space.first + planes) - space.origin] = 1
+    return Volume(space, values, views)

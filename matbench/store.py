@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from matbench.errors import UserError
 from matbench.plan import Cell, Plan
+from matbench.volumes import StoredVolume
 
 Status = Literal["ok", "skipped", "failed", "crashed", "interrupted"]
 FINAL: frozenset[Status] = frozenset({"ok", "skipped"})
@@ -37,6 +38,8 @@ class Outcome:
         Largest resident memory of the cell's process during the solve, in MiB.
     reason
         Why it is not `ok`, in one line.
+    has_volume
+        Did the estimate have a volume that could be kept? It is kept only on request.
     work, history
         As the estimate gave them; None for a number that is not finite.
     row
@@ -49,6 +52,7 @@ class Outcome:
     peak_mb: float | None = None
     threads: int | None = None
     reason: str = ""
+    has_volume: bool = False
     work: Mapping[str, int] = {}
     history: Mapping[str, list[float | None]] = {}
     row: int | None = None
@@ -209,11 +213,24 @@ class Store:
             raise ValueError(f"{self.cell(cell) / 'disparity.npz'} holds no disparity maps")
         return maps
 
+    def volume(self, cell: Cell) -> StoredVolume | None:
+        """The stored volume, or None where there is none, or a damaged one."""
+        try:
+            return StoredVolume.read(self.cell(cell) / "volume.npz")
+        except (ValueError, OSError):
+            return None
+
 
 def write_cell(
-    draft: Path, cell: Cell, outcome: Outcome, disparity: Mapping[int, NDArray[np.float32]] | None = None
+    draft: Path,
+    cell: Cell,
+    outcome: Outcome,
+    disparity: Mapping[int, NDArray[np.float32]] | None = None,
+    volume: StoredVolume | None = None,
 ) -> None:
-    """Fill a cell's folder: its facts and, where it has them, its maps."""
+    """Fill a cell's folder: its facts and, where it has them, its maps and its volume."""
+    if volume is not None:
+        volume.write(draft / "volume.npz")
     if disparity is not None:
         arrays: dict[str, Any] = {f"view_{view}": values for view, values in disparity.items()}
         np.savez_compressed(draft / "disparity.npz", **arrays)

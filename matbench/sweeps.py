@@ -213,7 +213,7 @@ def _sweep(
 
 def _moving(good: pd.DataFrame) -> tuple[str, ...]:
     """The regions that do not hold as many pixels at every value."""
-    counts = good.groupby(["region", "base", "repeat"], sort=False)["pixels"].nunique()
+    counts = good.groupby(["region", "metric", "base", "repeat"], sort=False)["pixels"].nunique()
     return tuple(dict.fromkeys(str(region) for region, *_ in counts.index[counts > 1]))
 
 

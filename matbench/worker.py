@@ -22,6 +22,7 @@ from matbench.scene import Scene
 from matbench.scenes import load_scene
 from matbench.spec import first_line
 from matbench.store import Outcome, Store, write_cell
+from matbench.volumes import StoredVolume
 
 _TINY = 16, 64  # rows and columns of the scene that methods are compiled on
 
@@ -36,6 +37,8 @@ class Job:
         Solve a second time, untimed, and write a recording.
     row
         The image row that it shows; the middle one if None.
+    volumes
+        Keep the estimate's volume, if it has one.
     """
 
     run: Path
@@ -45,6 +48,7 @@ class Job:
     threads: int
     record: bool
     row: int | None = None
+    volumes: bool = False
 
 
 def tiny(scene: Scene) -> Scene:
@@ -60,8 +64,8 @@ def tiny(scene: Scene) -> Scene:
 
 
 def hide_truth(scene: Scene) -> Scene:
-    """The scene as a method may see it: no ground truth and nothing that follows from it."""
-    return evolve(scene, truth={}, regions={}, visible={})
+    """The scene as a method may see it: no ground truth and nothing that follows from it, no view held out."""
+    return evolve(scene, truth={}, regions={}, visible={}, held_out=None)
 
 
 def checked(estimate: Any, scene: Scene) -> dict[int, NDArray[np.float32]]:
@@ -119,11 +123,27 @@ def _output_to(path: Path) -> Iterator[None]:
                 os.close(saved)
 
 
-def _solve(method: Algorithm, scene: Scene, job: Job) -> tuple[Outcome, dict[int, NDArray[np.float32]] | None]:
+def _volume(estimate: Estimate, scene: Scene) -> StoredVolume | None:
+    """The estimate's volume as it is kept; None where it has none of that kind, which is said in the log."""
+    if estimate.volume is None:
+        return None
+    try:
+        volume = StoredVolume.of(estimate.volume)
+        if volume.views[-1] >= scene.n or (volume.space.rows, volume.space.width) != (scene.height, scene.width):
+            raise ValueError(f"the volume spans the views {volume.views} of {volume.space}, which is another scene")
+    except (ValueError, TypeError, AttributeError) as error:
+        print(f"volume not kept: {type(error).__name__}: {error}")
+        return None
+    return volume
+
+
+def _solve(
+    method: Algorithm, scene: Scene, job: Job
+) -> tuple[Outcome, dict[int, NDArray[np.float32]] | None, StoredVolume | None]:
     unsupported = getattr(method, "unsupported_reason", None)
     reason = unsupported(scene) if unsupported else None
     if reason:
-        return Outcome("skipped", reason=str(reason)), None
+        return Outcome("skipped", reason=str(reason)), None, None
     context = Context(job.cell.seed, job.threads)
     start = time.perf_counter()
     try:
@@ -139,7 +159,9 @@ def _solve(method: Algorithm, scene: Scene, job: Job) -> tuple[Outcome, dict[int
     maps = checked(estimate, scene)
     history = {name: [v if isfinite(v) else None for v in map(float, vs)] for name, vs in estimate.history.items()}
     work = {name: int(count) for name, count in estimate.work.items()}
-    return Outcome("ok", seconds, warmed - start, peak, job.threads, "", work, history), maps
+    volume = _volume(estimate, scene) if job.volumes else None
+    has_volume = volume is not None if job.volumes else estimate.volume is not None
+    return Outcome("ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history), maps, volume
 
 
 def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcome:
@@ -168,17 +190,17 @@ def run_cell(job: Job) -> None:
     """
     store, cell = Store(job.run), job.cell
     with store.building(cell) as draft, _output_to(draft / "log.txt"):
-        maps = None
+        maps = volume = None
         try:
             plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
             method = spec.build(plugin.name, plugin.load(), cell.method.params)
             scene = hide_truth(load_scene(cell.scene, job.data))
             if scene.digest != cell.scene_digest:
                 raise UserError(f"{cell.scene} is not what it was when the run was planned")
-            outcome, maps = _solve(method, scene, job)
+            outcome, maps, volume = _solve(method, scene, job)
             if job.record and outcome.status == "ok":
                 outcome = _record(method, job, draft / "recording.rrd", outcome)
         except (Exception, SystemExit, KeyboardInterrupt) as error:  # Ctrl-C never comes to this process
             traceback.print_exc()
             outcome, maps = Outcome("failed", reason=f"{type(error).__name__}: {first_line(error)}"), None
-        write_cell(draft, cell, outcome, maps)
+        write_cell(draft, cell, outcome, maps, volume if maps is not None else None)

@@ -42,6 +42,8 @@ class Report:
         What each factor does (`matbench.ablation.COLUMNS`), if that was asked for.
     sweeps
         What took several numbers, as curves.
+    reliability
+        Reliability curves of the volumes that were kept (`matbench.scoring.reliabilities`).
     higher
         Metrics of which more is better; of all others, less is.
     """
@@ -55,6 +57,7 @@ class Report:
     facts: Mapping[str, str] = field(factory=dict)
     ablation: pd.DataFrame | None = None
     sweeps: tuple[Sweep, ...] = ()
+    reliability: pd.DataFrame | None = None
     higher: frozenset[str] = frozenset()
 
     def disparity(self, algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:

@@ -21,9 +21,15 @@ if TYPE_CHECKING:
 
 WORDS = {
     "baseline": "baseline (view steps)",
+    "bias": "bias of a camera (grey levels)",
+    "blur": "blur (px)",
+    "gain": "gain of a camera (share)",
+    "highlight": "highlight (grey levels)",
+    "misaligned": "vertical misalignment (px)",
     "n": "number of views",
     "noise": "noise (grey levels)",
     "views": "number of views",
+    "vignetting": "vignetting (share)",
 }
 IN_TERMINAL = ("nonocc", "all", "occ")
 

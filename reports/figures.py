@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from matbench.coloring import palette
+from matbench.reports.tables import label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,6 +138,41 @@ def cost(rows: pd.DataFrame, score: str, unit: str) -> "Figure | None":
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(INK)
     _place_labels(figure, axes, points)
+    return figure
+
+
+def reliability(curves: pd.DataFrame | None) -> "Figure | None":
+    """Observed share of surface against materiality: a line for each method, its bins pooled over all scenes.
+
+    Parameters
+    ----------
+    curves
+        As `matbench.scoring.reliabilities` gives them; None or empty gives no figure.
+    """
+    if curves is None or curves.empty:
+        return None
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.6, 3.9), layout="constrained")
+    axes = figure.subplots()
+    axes.plot([0, 1], [0, 1], color=INK, lw=1, ls=(0, (3, 3)), alpha=0.6)
+    for number, ((algorithm, params), rows) in enumerate(curves.groupby(["algorithm", "params"], sort=False)):
+        points = rows["points"].to_numpy(float)
+        place = np.minimum((rows["materiality"] * 10).astype(int), 9)
+        sums = pd.DataFrame({name: rows[name] * points for name in ("materiality", "observed")}).assign(points=points)
+        pooled = sums.groupby(place).sum()
+        x, y = (pooled[name] / pooled["points"] for name in ("materiality", "observed"))
+        name = printable(label(str(algorithm), str(params)))
+        axes.plot(x, y, marker="osD^v"[number % 5], ms=5, lw=1.4, color=f"C{number}", label=name)
+    axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
+    axes.set_xlabel("materiality", color=INK)
+    axes.set_ylabel("share of points with a surface", color=INK)
+    axes.tick_params(which="both", colors=INK)
+    axes.grid(True, alpha=0.25, lw=0.6, color=INK)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(INK)
+    for text in axes.legend(frameon=False, labelcolor=INK, loc="upper left").get_texts():
+        text.set_parse_math(False)
     return figure
 
 

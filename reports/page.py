@@ -51,6 +51,7 @@ def render(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": False}  # columns are in the order of the regions
     environment.filters["breakable"] = _breakable
     return environment.get_template("report.html.j2").render(
         report=report,
@@ -62,6 +63,7 @@ def render(report: Report) -> str:
         answer=_answer(rows, scope),
         counts=report.cells["status"].value_counts().to_dict(),
         table=_default_table(rows),
+        regions=tables.summarised(report.results),
         scenes_table=_default_scenes(report, scope),
         data=_data(report, scope),
         figure=_figure(rows),
@@ -73,6 +75,7 @@ def render(report: Report) -> str:
         bad=_records(report.cells[report.cells["status"] != "ok"], ("method", "scene", "seed", "status", "reason")),
         methods=_methods(report.cells),
         switches=[] if report.ablation is None else switches.lines(report.ablation).values.tolist(),
+        reliability=_svg(figures.reliability(report.reliability)),
         forest=None if report.ablation is None else _svg(switches.forest(report.ablation)),
     )
 
@@ -150,17 +153,18 @@ def _default_scenes(report: Report, scope: Shared) -> list[tuple[str, list[list[
 def _data(report: Report, scope: Shared) -> dict[str, Any]:
     """Everything that the page lets one choose: summary and scenes for each metric and region."""
     units, found = tables.metrics(report.results), tables.regions(report.results)
+    shown = tables.summarised(report.results)
     ranked = pd.Series({m: scope.is_ranked(m) for m in scope.methods}, dtype=bool)
     parts = {(str(m), str(r)): part for (m, r), part in report.results.groupby(["metric", "region"], sort=False)}
     means: dict[str, dict[str, Any]] = {m: {} for m in units}
     scenes: dict[str, dict[str, Any]] = {m: {} for m in units}
     for metric, unit in units.items():
-        for region in dict.fromkeys((*tables.REGIONS, *found)):
+        for region in dict.fromkeys((*shown, *found)):
             part = parts.get((metric, region), report.results.iloc[:0])
             if region in found:
                 table = tables.per_scene(part, region, metric)
                 scenes[metric][region] = _scene_entries(report, scope, table, metric)
-            if region in tables.REGIONS:
+            if region in shown:
                 mean = tables.means(part, scope, region, metric)
                 means[metric][region] = _entries(mean, ranked, unit, metric in report.higher)
     return {"methods": list(scope.methods), "regions": found, "units": units, "means": means, "scenes": scenes}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 from attrs import frozen
 
+from matbench.regions import VIEW_REGIONS
 from matbench.spec import read_scene
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 
 METRIC, REGION = "total_bad_1", "all"
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
+VIEWS = tuple(VIEW_REGIONS)
 
 _NO_SCENES: frozenset[str] = frozenset()
 
@@ -90,9 +92,14 @@ def shared(results: pd.DataFrame, cells: pd.DataFrame) -> Shared:
 
 
 def regions(results: pd.DataFrame) -> list[str]:
-    """The regions that were scored, the field's own first."""
-    found = list(results["region"].unique())
-    return [r for r in REGIONS if r in found] + [r for r in found if r not in REGIONS]
+    """The regions that were scored, the field's own first, then those over all views."""
+    found, known = list(results["region"].unique()), (*REGIONS, *VIEWS)
+    return [r for r in known if r in found] + [r for r in found if r not in known]
+
+
+def summarised(results: pd.DataFrame) -> list[str]:
+    """The regions that the summary shows: the field's five, and those over all views that were scored."""
+    return [*REGIONS, *(r for r in regions(results) if r in VIEWS)]
 
 
 def metrics(results: pd.DataFrame) -> dict[str, str]:
@@ -148,13 +155,13 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, hi
 
     Returns
     -------
-    Index: the methods' labels. Columns: ``<metric> <region>`` for the five regions, ``avg all``
+    Index: the methods' labels. Columns: ``<metric> <region>`` for `summarised` regions, ``avg all``
     (pixels of the pair), ``seconds``, then ``scenes`` (how many the means are over), ``asked``
     (how many it was asked for) and ``ranked``. Ranked methods share their scenes; a method that
     lacks one of these has means over its own scenes and is not ranked.
     """
     scope = shared(results, cells)
-    columns = {f"{metric} {region}": means(results, scope, region, metric) for region in REGIONS}
+    columns = {f"{metric} {region}": means(results, scope, region, metric) for region in summarised(results)}
     columns["avg all"] = means(results, scope, REGION, "avg")
     columns["seconds"] = seconds(cells, scope)
     out = pd.DataFrame(columns, index=pd.Index(scope.methods, name="method", dtype=str), dtype=float)

@@ -11,12 +11,14 @@ from matbench.reports.tables import (
     METRIC,
     REGION,
     REGIONS,
+    VIEWS,
     Shared,
     labelled,
     metrics,
     per_scene,
     places,
     shared,
+    summarised,
     summary,
 )
 from matbench.reports.tables import text as shown
@@ -30,14 +32,22 @@ _PADDING = 2
 def tables(
     results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False, width: int = WIDTH
 ) -> list[Table]:
-    """The summary, the scenes one by one and what went wrong; empty tables are left out.
+    """The summary, its regions over all views, the scenes one by one and what went wrong; no empty tables.
 
     Where there are fewer than `WIDTH` columns, the summary leaves out `NARROW`.
     """
     scope = shared(results, cells)
     out = []
     if scope.methods:
-        out.append(_summary(results, cells, scope, metric, higher, width))
+        heads = {f"{metric} {r}": r.replace("textureless", "texture-\nless") for r in REGIONS}
+        heads |= {"avg all": "avg\nall", "seconds": "time"}
+        if width < WIDTH:
+            heads = {column: head for column, head in heads.items() if column.split()[-1] not in NARROW}
+        out.append(_summary(results, cells, scope, metric, higher, "by region", heads))
+        over_views = [r for r in summarised(results) if r in VIEWS]
+        if per_scene(results, VIEWS[0], metric).notna().any(axis=None):
+            heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in over_views}
+            out.append(_summary(results, cells, scope, metric, higher, "by the views that see a point", heads))
     if len(results):
         out += _scenes(results, cells, scope, metric, higher, width)
     bad = labelled(cells)
@@ -55,25 +65,31 @@ def _number(value: float, unit: str, place: int) -> Text:
     return Text(shown(value, unit), style="bold" if place == 1 else "")
 
 
-def _summary(results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str, higher: bool, width: int) -> Table:
+def _summary(
+    results: pd.DataFrame,
+    cells: pd.DataFrame,
+    scope: Shared,
+    metric: str,
+    higher: bool,
+    what: str,
+    heads: dict[str, str],
+) -> Table:
+    """Methods x the columns of the summary that have a heading."""
     rows, unit = summary(results, cells, metric, higher), metrics(results).get(metric, "%")
     count = f"{len(scope.scenes)} of {len(scope.asked)} scenes"
     hint = "; too few scenes to conclude" if scope.distinct < FEW else ""
-    table = _plain(f"{metric} ({unit}) by region, mean over {count}{hint}")
+    table = _plain(f"{metric} ({unit}) {what}, mean over {count}{hint}")
     table.add_column("#", justify="right", no_wrap=True)
     table.add_column("method", overflow="fold", min_width=12)
-    heads = {f"{metric} {r}": (r.replace("textureless", "texture-\nless") + f"\n{unit}", unit) for r in REGIONS}
-    heads |= {"avg all": ("avg\nall\npx", "px"), "seconds": ("time\ns", "s")}
-    if width < WIDTH:
-        heads = {column: head for column, head in heads.items() if column.split()[-1] not in NARROW}
-    for head, _ in heads.values():
-        table.add_column(Text(head), justify="right", no_wrap=True, vertical="top")
-    marks = {c: places(rows.loc[rows["ranked"], c], u, higher and metric in c) for c, (_, u) in heads.items()}
+    units = {column: {"avg all": "px", "seconds": "s"}.get(column, unit) for column in heads}
+    for column, head in heads.items():
+        table.add_column(Text(f"{head}\n{units[column]}"), justify="right", no_wrap=True, vertical="top")
+    marks = {c: places(rows.loc[rows["ranked"], c], u, higher and metric in c) for c, u in units.items()}
     for number, (method, row) in enumerate(rows.iterrows(), 1):
         name = Text(str(method))
         if not row["ranked"]:
             name.append(f"\nnot ranked: {row['scenes']} of {row['asked']} scenes", style="italic")
-        values = [_number(row[c], u, marks[c].get(method, 0)) for c, (_, u) in heads.items()]
+        values = [_number(row[c], u, marks[c].get(method, 0)) for c, u in units.items()]
         table.add_row(str(number), name, *values, style="" if row["ranked"] else "dim")
     return table
 

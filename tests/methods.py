@@ -6,7 +6,7 @@ import time
 import numpy as np
 from attrs import frozen
 
-from matbench import Context, Estimate, Scene
+from matbench import Context, DisparitySpace, Estimate, Scene, Volume
 
 
 def _flat(scene: Scene, value: float) -> Estimate:
@@ -125,6 +125,20 @@ class Empty:
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         return _flat(scene, np.nan)
+
+
+@frozen
+class Solid:
+    """A wall of half materiality, in the middle plane."""
+
+    material: float = 0.5
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        space = DisparitySpace.covering(scene.disparities, scene.n, scene.height, scene.width)
+        values = np.zeros(space.shape, np.float32)
+        values[:, space.planes // 2] = self.material
+        flat = _flat(scene, float(space.disparities[space.planes // 2]))
+        return Estimate(flat.disparity, volume=Volume(space, values, tuple(range(scene.n))))
 
 
 class Shy:

@@ -11,12 +11,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from attrs import evolve
 
 import matbench
 from matbench import comparison
 from matbench.errors import UserError
 from matbench.plan import methods
+from matbench.regions import REGIONS
 from matbench.scoring import RESULT_COLUMNS
+from matbench.space import DisparitySpace
 
 METHODS = Path(__file__).with_name("methods.py")
 SMALL = "synthetic/box[size=96x72]"
@@ -35,7 +38,11 @@ def test_results_are_tidy_and_exact(tmp_path: Path) -> None:
     assert tuple(results.columns) == RESULT_COLUMNS
     scene = matbench.load_scene(SMALL)
     error = np.abs(2 - scene.truth[scene.ref].astype(float)) * scene.pair_steps
-    for region, mask in scene.regions.items():
+    assert list(results.region.unique()) == list(REGIONS)
+    for region, mask in scene.scored_regions.items():
+        if not mask.any():
+            assert results[results.region == region].value.isna().all()
+            continue
         rows = results[results.region == region].set_index("metric")
         known = error[mask]
         assert (rows.pixels == mask.sum()).all()
@@ -160,6 +167,80 @@ def test_damaged_maps_are_computed_anew(tmp_path: Path, damage: str) -> None:
     assert (run / "results.csv").read_bytes() == scores
 
 
+def _rows(results: pd.DataFrame, metric: str, region: str = "all") -> pd.Series:
+    return results[(results.metric == metric) & (results.region == region)].set_index("algorithm").value
+
+
+def test_volumes_are_kept_on_request_only_and_then_scored(tmp_path: Path) -> None:
+    plain = compare(tmp_path, "solid", "flat")
+    run = tmp_path / "run"
+    place = {name: run / "cells" / key for name, key in cells(tmp_path).cell.items()}
+    assert "surface_f_1" not in set(plain.metric)
+    assert not (place["solid"] / "volume.npz").exists()
+    flat = (place["flat"] / "cell.json").stat().st_mtime_ns
+
+    scored = compare(tmp_path, "solid", "flat", volumes=True)  # the same run, solved again where there is a volume
+    assert (place["flat"] / "cell.json").stat().st_mtime_ns == flat
+    assert set(_rows(scored, "surface_recall_1").index) == {"solid"}
+    scene = matbench.load_scene(SMALL)
+    truth = scene.truth[scene.ref].astype(float)
+    space = DisparitySpace.covering(scene.disparities, 5, 72, 96)
+    middle = float(space.disparities[space.planes // 2])
+    near = np.abs(truth - middle) <= 1 + 1e-4
+    assert _rows(scored, "surface_recall_1")["solid"] == pytest.approx(100 * near.mean())
+    assert _rows(scored, "surface_precision_1")["solid"] == pytest.approx(
+        100 * near.sum() / (near | (truth < middle)).sum()
+    )
+    assert 0 < _rows(scored, "brier", "half_occluded")["solid"] < 1
+    curve = pd.read_csv(run / "reliability.csv")
+    assert set(curve.materiality.round(3)) == {0, 0.502}  # 128 of 255
+    assert "Calibration of materialities" in (run / "report.html").read_text()
+
+    before = (place["solid"] / "cell.json").stat().st_mtime_ns
+    again = compare(tmp_path, "solid", "flat", volumes=True)
+    assert (place["solid"] / "cell.json").stat().st_mtime_ns == before, "nothing is computed twice"
+    pd.testing.assert_frame_equal(again, scored)
+    (place["solid"] / "volume.npz").write_bytes(b"junk")
+    pd.testing.assert_frame_equal(compare(tmp_path, "solid", "flat", volumes=True), scored)
+
+
+def test_what_is_no_materiality_is_said_and_costs_nothing_else(tmp_path: Path) -> None:
+    results = compare(tmp_path, "solid[material=1.5]", volumes=True)
+    found = cells(tmp_path)
+    assert found.status["solid"] == "ok"
+    assert "surface_f_1" not in set(results.metric)
+    log = (tmp_path / "run" / "cells" / found.cell["solid"] / "log.txt").read_text()
+    assert "volume not kept" in log
+    assert "from 0 to 1" in log
+    ready = comparison.prepare("solid[material=1.5]", SMALL, out=tmp_path / "run", plugin=[METHODS], volumes=True)
+    assert not comparison.run.pending(ready.plan, ready.store, record=False, volumes=True)
+
+
+def test_predictions_are_scored_with_and_without_truth(tmp_path: Path) -> None:
+    held = "synthetic/box[predict=right size=96x72]"
+    results = compare(tmp_path, "flat[value=2]", "flat[value=4]", "empty", scene=held)
+    predicted = results[results.metric == "prediction_psnr"]
+    assert set(predicted.view) == {"4"}
+    assert set(predicted.region) == {"all"}
+    assert set(predicted.unit) == {"dB"}
+    by_params = predicted.set_index(["algorithm", "params"]).value
+    assert by_params["flat", "value=2.0"] > by_params["flat", "value=4.0"], "the wall is at 0.75, the floor nearer"
+    assert np.isnan(by_params["empty", ""])
+    assert _rows(results, "prediction_coverage")["empty"] == 0
+    assert "total_bad_1" in set(results.metric), "where there is truth it counts, too"
+
+    known = matbench.load_scene(held)
+    blind = evolve(known, truth={}, regions={}, visible={})
+    ready = comparison.prepare("flat[value=2]", held, out=tmp_path / "blind", plugin=[METHODS])
+    ready.run()
+    ready = evolve(ready, scenes={held: blind})
+    alone, _ = ready.tables()
+    assert set(alone.metric) == {"prediction_psnr", "prediction_coverage"}
+    assert _rows(alone, "prediction_psnr")["flat"] == by_params["flat", "value=2.0"]
+    page = ready.report(alone, pd.read_csv(tmp_path / "blind" / "cells.csv", keep_default_na=False))
+    assert "There is no ground truth" in page.read_text()
+
+
 def test_a_method_too_large_for_the_warm_up_still_competes(tmp_path: Path) -> None:
     results = compare(tmp_path, "needs_room")
     assert cells(tmp_path).status["needs_room"] == "ok"
@@ -226,7 +307,7 @@ def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
         "print(len(table))\n"
     )
     said = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120, check=True).stdout
-    assert said.split() == ["once", str(5 * 15)]
+    assert said.split() == ["once", str(9 * 15)]
 
 
 def test_the_plan_on_disk_holds_no_code_and_reads_back(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from matbench import coloring, drawing, recording
 from matbench.algorithm import Context, Estimate, Probe
 from matbench.errors import UserError
 from matbench.recording import RecordingError, RecordingProbe, record, view
+from matbench.regions import VIEW_REGIONS
 from matbench.scene import Range, Scene
 from matbench.space import DisparitySpace, Volume, visibility
 
@@ -112,6 +113,7 @@ def rows(path: Path) -> dict[str, list[Row]]:
 
 def test_every_stream_is_there(rows: dict[str, list[Row]]) -> None:
     once = {"/about", "/truth/disparity", "/estimate/disparity", "/estimate/error", "/regions", "/regions/all"}
+    once |= {f"/regions/{name}" for name in VIEW_REGIONS}
     once |= {"/regions/nonocc", "/slices/similarity", "/surface", "/surface/points", "/space", "/space/materiality"}
     once |= {"/volumes/materiality", "/views/im2/row"}
     labels = ["im0", "im2", "im4", "im6"]

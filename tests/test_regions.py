@@ -7,8 +7,8 @@ import pytest
 
 from matbench.datasets.images import read_grey
 from matbench.datasets.middlebury import MIDDLEBURY_2001, MIDDLEBURY_2003
-from matbench.datasets.synthetic import SYNTHETIC
-from matbench.regions import near_jumps, regions, seen_from, textureless
+from matbench.datasets.synthetic import SYNTHETIC, WORLDS
+from matbench.regions import VIEW_REGIONS, near_jumps, regions, seen_from, textureless, view_regions
 from matbench.scene import Scene
 
 NAN = np.nan
@@ -164,3 +164,77 @@ def test_known_visibility_is_used() -> None:
     seen = np.random.default_rng(0).random((4, 30)) < 0.5
     masks = regions(np.zeros((4, 30, 3), np.uint8), truth, 1, seen)
     np.testing.assert_array_equal(masks["nonocc"], seen)
+
+
+def _which(masks) -> list[str]:
+    """The one region of every pixel of a row; a blank where it is in none."""
+    assert list(masks) == list(VIEW_REGIONS)
+    assert (np.sum(list(masks.values()), axis=0) <= 1).all()
+    letters = np.full(masks["seen_once"].shape, " ")
+    for letter, mask in zip("ahfo", masks.values(), strict=True):
+        letters[mask] = letter
+    return ["".join(row) for row in letters]
+
+
+def test_views_that_see_a_point_are_counted() -> None:
+    truth = np.array([[1, 1, 1, 1, 4, 4, 1, 1, NAN, 1, 1, 1]], np.float32)
+    # in view 2 the two at disparity 4 cover columns 0 and 1: the wall's columns 1 and 2; column 0 leaves the frame
+    # in view 0 they cover 8 and 9: the wall's columns 7 and 8; column 11 leaves the frame
+    assert _which(view_regions(truth, 1, 3)) == ["fhhaaaah aaf"]
+    assert _which(view_regions(truth, 0, 2)) == ["oooaaaaa aaa"]
+    assert _which(view_regions(truth, 1, 2)) == ["aaaaaaao aao"]
+    # view 3 (two steps right): the wall moves to x - 2, the near ones from 4 and 5 to -4 and -3, out of the frame
+    assert _which(view_regions(truth, 1, 4)) == ["fhhaffah aaf"]
+
+
+def test_hidden_here_and_out_of_frame_there_is_half_occluded_or_seen_once() -> None:
+    seen = np.zeros((4, 1, 4), bool)
+    seen[1] = True
+    seen[2, 0] = [True, False, False, True]
+    truth = np.array([[0, 0, 9, 9]], np.float32)  # the last two leave the frame on either side
+    # seen in 2, hidden in 0 and 3; nowhere but in 1; seen nowhere, out of the frame; seen in 2, out of frames
+    assert _which(view_regions(truth, 1, 4, seen)) == ["hoof"]
+
+
+@pytest.mark.parametrize("name", sorted(WORLDS))
+def test_derived_regions_over_views_agree_with_exact_ones(name: str) -> None:
+    """The share of pixels in the same region, and the overlap of the hard ones, from one view's truth alone."""
+    scene = SYNTHETIC.load(name, {}, None)
+    truth = scene.truth[scene.ref]
+    exact, derived = (view_regions(truth, scene.ref, scene.n, seen) for seen in (scene.visible[scene.ref], None))
+    assert all("a" in row and " " not in row for row in _which(exact))
+    agreement = sum((exact[region] & derived[region]).mean() for region in exact)
+    is_thin = name == "thin"  # wires narrower than a pixel: where they begin cannot be told from pixels
+    assert agreement > (0.96 if is_thin else 0.985)
+    assert _overlap(exact["half_occluded"], derived["half_occluded"]) > (0.85 if is_thin else 0.88)
+    assert _overlap(exact["out_of_frame"], derived["out_of_frame"]) > 0.99
+
+
+def test_regions_over_views_follow_a_choice_of_views_and_the_others_do_not() -> None:
+    scene = SYNTHETIC.load("steps", {"size": "120x90"}, None)
+    three = scene.choose([0, 2, 4])
+    near = scene.choose([1, 2, 3])
+    for name in scene.regions:
+        np.testing.assert_array_equal(three.scored_regions[name], scene.regions[name])
+    shares = [s.scored_regions["half_occluded"].mean() for s in (scene, three, near)]
+    assert shares[0] > 1.5 * shares[2] > 0
+    assert shares[1] == pytest.approx(shares[0], abs=0.01)
+    np.testing.assert_array_equal(
+        sum(near.scored_regions[name].astype(int) for name in VIEW_REGIONS), np.ones((90, 120), int)
+    )
+    two = scene.choose([2, 4]).scored_regions  # the field's pair
+    np.testing.assert_array_equal(two["seen_in_all"], scene.regions["nonocc"])
+    np.testing.assert_array_equal(two["seen_once"], scene.regions["occ"])
+    assert not two["half_occluded"].any()
+
+
+def test_real_scenes_have_regions_over_views(data_root: Path) -> None:
+    scene = MIDDLEBURY_2003.load("teddy", {}, data_root)
+    masks = scene.scored_regions
+    known = np.isfinite(scene.truth[scene.ref])
+    np.testing.assert_array_equal(np.any([masks[name] for name in VIEW_REGIONS], axis=0), known)
+    assert masks["half_occluded"].mean() > 0.05
+    assert masks["out_of_frame"].mean() > 0.1, "eight views reach far to the right"
+    # what the pair sees is seen in two views at least, and what all see the pair sees
+    assert not (masks["seen_once"] & masks["nonocc"]).any()
+    assert not (masks["seen_in_all"] & masks["occ"]).any()

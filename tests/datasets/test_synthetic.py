@@ -5,12 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from matbench.datasets.rendering import Column, Paint, Rectangle, Rig, Sphere
-from matbench.datasets.synthetic import SYNTHETIC, WORLDS, pattern
+from matbench.datasets.synthetic import SYNTHETIC, WORLDS, materiality
+from matbench.datasets.synthetic.cameras import Strengths, exposed, heights
+from matbench.datasets.synthetic.rendering import Rig, mirrored
+from matbench.datasets.synthetic.surfaces import EVERYWHERE, LIGHT, Column, Disc, Paint, Rectangle, Sphere
+from matbench.datasets.synthetic.textures import pattern
 from matbench.errors import UserError
 from matbench.scene import Scene
 
 PINNED = [-0.699616, -0.784289, -0.679456, 0.839368, -0.569503, -0.892212]
+DIGESTS = {"box": "45b2409079e539e4", "curved": "fc74608f94a75284", "weak": "3b472ae62c13c112"}
 PAINT = Paint((100, 100, 100), 20, 1.0)
 SMALL = {"size": "120x90"}
 
@@ -80,7 +84,9 @@ def test_what_is_seen_in_another_view_has_the_same_disparity_there(scene: Scene)
             assert (np.abs(there - truth).min(axis=0) < 0.2)[seen[other]].mean() > 0.999
             hidden = inside & ~seen[other]
             if hidden.any():
-                assert (there.max(axis=0) > truth)[hidden].mean() > 0.999
+                # what hides may be narrower than a pixel in that scene, and fall between pixels
+                share = 0.995 if "thin" in scene.name else 0.999
+                assert (there.max(axis=0) > truth)[hidden].mean() > share
 
 
 def test_visibility_is_mutual(scene: Scene) -> None:
@@ -110,6 +116,141 @@ def test_default_scenes_have_what_their_names_promise() -> None:
     assert scenes["curved"].truth[2].min() < 0 < scenes["curved"].truth[2].max()
     assert all(s.views.shape == (5, 180, 240, 3) for s in scenes.values())
     assert all(s.regions["occ"].mean() > 0.02 for s in scenes.values())
+    assert {name: scenes[name].digest[:16] for name in DIGESTS} == DIGESTS
+    assert not any(_faces_the_cameras(scenes[name]).any() for name in ("slanted", "spheres"))
+    assert _faces_the_cameras(scenes["layers"]).mean() > 0.9
+    assert scenes["layers"].truth[2].max() > 4 * scenes["layers"].truth[2].min()
+    assert np.diff(scenes["steps"].truth[2], axis=1).max() * 2 > 20, "px of the pair"
+    widths = _widths(scenes["thin"].truth[2] > 3)
+    assert widths.min() == 1
+    assert np.median(widths) <= 3
+    fence = scenes["fence"].truth[2][60] > 3
+    starts = np.flatnonzero(np.diff(fence.astype(int)) == 1)
+    assert len(starts) == 23
+    assert set(np.diff(starts)) == {7, 8}
+    upright = _widths((scenes["fence"].truth[2] > 3)[:, starts[10] + 1][None])
+    assert len(upright) == 7, "one picket and, below it, the rails, across which the column runs"
+    assert upright[0] >= 76
+    assert set(upright[1:]) <= {3, 4}
+
+
+def _faces_the_cameras(scene: Scene) -> np.ndarray:
+    """Where disparity is the same all around."""
+    truth = scene.truth[scene.ref]
+    return np.ptp(np.lib.stride_tricks.sliding_window_view(truth, (3, 3)), axis=(2, 3)) == 0
+
+
+def _widths(mask: np.ndarray) -> np.ndarray:
+    """Lengths of the runs of True in the rows."""
+    edges = np.diff(np.pad(mask.astype(int), ((0, 0), (1, 1))), axis=1)
+    return np.nonzero(edges == -1)[1] - np.nonzero(edges == 1)[1]
+
+
+@pytest.mark.parametrize("name", sorted(WORLDS))
+def test_windows_leave_nothing_out(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The slow twin tries every ray on every surface."""
+    rig = Rig(WORLDS[name].build(), 5, 60, 45, 60, 1 / 40, WORLDS[name].offset / 4)
+    rows = np.arange(45.0)[:, None]
+    places = np.random.default_rng(0).uniform(-3, 62, (45, 60))
+    quick = [rig.cast(view, columns, rows) for view in (0, 3) for columns in (np.arange(60.0)[None], places)]
+    for kind in (Rectangle, Disc, Sphere, Column):
+        monkeypatch.setattr(kind, "window", lambda self, eye: EVERYWHERE)
+    slow = [rig.cast(view, columns, rows) for view in (0, 3) for columns in (np.arange(60.0)[None], places)]
+    for (depth, index), (expected, which) in zip(quick, slow, strict=True):
+        np.testing.assert_array_equal(depth, expected)
+        np.testing.assert_array_equal(index, which)
+
+
+def test_highlights_move_with_the_camera_and_nothing_else_does() -> None:
+    """On a wall without texture the only thing to be seen is the highlight: it stays where it is in every view."""
+    wall = Rectangle((-8, -8, 7.6), (16, 0, -4.7), (0, 16, -4.6), Paint((60, 60, 60), 0, 1.0))
+    dull, shiny = (Rig([wall], 3, 61, 41, 60, 0.1, highlight=grey) for grey in (0, 100))
+    marks = pattern(0)
+    assert np.ptp(dull.picture(0, marks)) < 1e-3
+    peaks = [np.unravel_index(shiny.picture(view, marks)[..., 0].argmax(), (41, 61)) for view in range(3)]
+    assert len(set(peaks)) == 1, "the light is infinitely far"
+    assert shiny.picture(1, marks).max() == pytest.approx(dull.picture(1, marks).max() + 100, abs=2)
+    assert wall.depth(0.0, np.zeros((1, 1)), np.zeros((1, 1))).item() == pytest.approx(2.95)
+
+
+def test_a_mirror_towards_the_light_is_as_bright_as_it_can_be() -> None:
+    here = (np.zeros(1), np.zeros(1), np.ones(1))  # a normal (0, 0, 1), the eye along it
+    assert mirrored(LIGHT, tuple(np.array([c]) for c in LIGHT)) == pytest.approx(1)
+    half = np.array(LIGHT) / 2 + (0, 0, 0.5)
+    assert mirrored((0, 0, 1), here) == pytest.approx((half[2] / np.linalg.norm(half)) ** 32)
+
+
+@pytest.mark.parametrize(
+    ("option", "level"), [("gain", "0.3"), ("bias", "20"), ("vignetting", "0.5"), ("blur", "2"), ("highlight", "90")]
+)
+def test_cameras_change_pictures_only(option: str, level: str) -> None:
+    clean, changed = (SYNTHETIC.load("box", SMALL | {"noise": "0"} | more, None) for more in ({}, {option: level}))
+    assert changed.digest != clean.digest
+    for view in range(5):
+        np.testing.assert_array_equal(changed.truth[view], clean.truth[view])
+        np.testing.assert_array_equal(changed.visible[view], clean.visible[view])
+
+
+def _clean_and(**strengths: float) -> tuple[np.ndarray, list[np.ndarray]]:
+    """A grey picture, and what five cameras make of it."""
+    picture = np.random.default_rng(0).uniform(60, 140, (90, 120, 3)).astype(np.float32)
+    views = [exposed(picture, Strengths(noise=0, **strengths), 3, view, 5) for view in range(5)]
+    return picture.astype(float), [v.astype(float) for v in views]
+
+
+def test_gain_and_bias_differ_from_camera_to_camera() -> None:
+    picture, views = _clean_and(gain=0.3)
+    gains = [float((v * picture).sum() / (picture**2).sum()) for v in views]
+    assert max(abs(g - 1) for g in gains) == pytest.approx(0.3, abs=1e-3)
+    assert len({round(g, 3) for g in gains}) == 5
+    picture, views = _clean_and(bias=20)
+    biases = [float((v - picture).mean()) for v in views]
+    assert max(map(abs, biases)) == pytest.approx(20, abs=0.02)
+    assert np.corrcoef(gains, biases)[0, 1] < 0.99, "each is drawn for itself"
+
+
+def test_vignetting_darkens_corners_and_blur_smooths() -> None:
+    picture, views = _clean_and(vignetting=0.4)
+    assert views[0][0, 0] / picture[0, 0] == pytest.approx(0.6, abs=0.01)
+    assert views[4][45, 60] / picture[45, 60] == pytest.approx(1, abs=0.01)
+    picture, views = _clean_and(blur=2)
+    # white noise keeps 1 / (4 pi sigma^2) of its variance
+    assert views[2][10:-10, 10:-10].var() / picture.var() == pytest.approx(1 / (16 * np.pi), rel=0.1)
+    assert views[2].mean() == pytest.approx(picture.mean(), abs=0.2)
+
+
+def test_misaligned_views_stay_exact() -> None:
+    options = SMALL | {"noise": "0"}
+    straight, crooked = (SYNTHETIC.load("spheres", options | more, None) for more in ({}, {"misaligned": "3"}))
+    lower = heights(Strengths(misaligned=3), 0, 5)
+    assert max(map(abs, lower)) == 3
+    view = int(np.argmax(np.abs(lower)))
+    shift = round(lower[view])
+    rows = np.arange(10, 80)
+    np.testing.assert_array_equal(crooked.truth[view][rows + shift], straight.truth[view][rows])
+    np.testing.assert_array_equal(crooked.views[view][rows + shift], straight.views[view][rows])
+    # in the reference view the rows that another camera misses are not seen there
+    gone = int(np.ceil(abs(lower[view] - lower[2]) - 0.5))
+    ends = crooked.visible[2][view][-gone:] if lower[view] > lower[2] else crooked.visible[2][view][:gone]
+    assert not ends.any()
+
+
+@pytest.mark.parametrize("fineness", [1, 2])
+@pytest.mark.parametrize("name", ["box", "curved", "steps"])
+def test_materialities_are_those_of_the_truth(name: str, fineness: int) -> None:
+    """Along every ray of every view the first material point is the true one, within a plane."""
+    scene, exact = SYNTHETIC.load(name, SMALL, None), materiality(name, SMALL, fineness)
+    assert set(np.unique(exact.values)) == {0, 1}
+    for view in range(5):
+        rays = exact.space.in_view(exact.values, view)
+        nearest = exact.space.planes - 1 - rays[:, ::-1].argmax(axis=1)
+        assert rays.any(axis=1).all()
+        off = exact.space.disparities[nearest] - scene.truth[view]
+        # another view's ray may mark a neighbour where the surface leans
+        assert (np.abs(off) * fineness <= 0.5001).mean() > 0.9
+        assert (np.abs(off) * fineness <= 1.0001).mean() > 0.97
+        plane = np.round(scene.truth[view].astype(float) * fineness).astype(int) - exact.space.first
+        assert np.take_along_axis(rays, plane[:, None], axis=1).all()
 
 
 def test_the_same_every_time_and_another_with_another_seed() -> None:
@@ -194,6 +335,8 @@ def test_choosing_views_rescales() -> None:
         ("box", {"seed": "-1"}, "from 0"),
         ("box", {"noise": "nan"}, "0 to 50"),
         ("box", {"noise": "51"}, "0 to 50"),
+        ("box", {"gain": "1"}, "from 0 to 0.9"),
+        ("box", {"misaligned": "-1"}, "from 0 to 20"),
         ("box", {"size": "240"}, "WIDTHxHEIGHT"),
         ("box", {"size": "9999x9999"}, "1920x1440"),
         ("box", {"size": "100x300"}, "twice as high"),
@@ -210,8 +353,4 @@ def test_wrong_input_is_told_in_one_line(name: str, options: dict[str, str], wor
 
 def test_listings_need_no_data(tmp_path: Path) -> None:
     assert SYNTHETIC.listings(None) == SYNTHETIC.listings(tmp_path)
-    assert [(listing.name, listing.present) for listing in SYNTHETIC.listings(None)] == [
-        ("box", True),
-        ("curved", True),
-        ("weak", True),
-    ]
+    assert {listing.name: listing.present for listing in SYNTHETIC.listings(None)} == dict.fromkeys(WORLDS, True)

@@ -136,3 +136,25 @@ def test_the_figure_takes_names_literally(report: Report) -> None:
     assert "$x^$ \N{REPLACEMENT CHARACTER}" in text
     assert "&lt;b&gt;&amp;" in text
     assert figures.cost(rows.assign(ranked=False), "total_bad_1 all", "%") is None
+
+
+def test_regions_over_all_views_stand_in_the_summary(report: Report) -> None:
+    more = report.results[report.results["region"] == "mine"].assign(region="half_occluded", value=77.125)
+    html = page.render(evolve(report, results=pd.concat([report.results, more])))
+    assert "half_" in html
+    data = data_of(html)
+    assert list(data["means"]["bad_1"]) == [*tables.REGIONS, "half_occluded"]
+    assert {shown for _, shown, _ in data["means"]["bad_1"]["half_occluded"].values()} == {"77.12"}
+    assert html.count(">77.12<") >= len(data["methods"])
+
+
+def test_calibration_is_drawn_where_volumes_were_kept(report: Report) -> None:
+    assert "Calibration of" not in page.render(report)
+    hostile = "<script>alert(1)</script>"
+    curve = {"materiality": [0.05, 0.9], "observed": [0.0, 1.0], "points": [9000, 300]}
+    curves = pd.DataFrame({"algorithm": hostile, "params": "a=$1", "scene": "made/one", "seed": 0, **curve})
+    html = page.render(evolve(report, reliability=curves))
+    assert "Calibration of materialities" in html
+    assert "share of points with a surface" in html
+    assert hostile not in html
+    assert "Calibration of" not in page.render(evolve(report, reliability=curves.iloc[:0]))

@@ -10,11 +10,13 @@ from matbench.reports import tables
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
 
 
-def run_of(metric: str, values: dict[str, float]) -> tuple[pd.DataFrame, pd.DataFrame]:
+def run_of(
+    metric: str, values: dict[str, float], regions: tuple[str, ...] = REGIONS
+) -> tuple[pd.DataFrame, pd.DataFrame]:
     rows = [
         (method, "", "synthetic/box", "2", 0, region, name, value, "%" if name == metric else "px", 9)
         for method, value in values.items()
-        for region in REGIONS
+        for region in regions
         for name in (metric, "avg")
     ]
     columns = ["algorithm", "params", "scene", "view", "seed", "region", "metric", "value", "unit", "pixels"]
@@ -46,3 +48,14 @@ def test_a_narrow_terminal_keeps_methods_and_times() -> None:
         assert name in narrow
     assert "disc" in wide
     assert "disc" not in narrow
+
+
+def test_regions_over_all_views_have_a_table_of_their_own() -> None:
+    values = {"materiality": 1.5, "okutomi_kanade": 2.5}
+    run = run_of("total_bad_1", values, (*REGIONS, *tables.VIEWS))
+    text = printed(80, *run, "total_bad_1", False)
+    assert "by the views that see a point" in text
+    assert "occluded" in text
+    assert max(map(len, text.splitlines())) <= 80
+    assert "by the views" not in printed(80, *run_of("total_bad_1", values), "total_bad_1", False)
+    assert list(tables.summary(*run).columns[:9]) == [f"total_bad_1 {r}" for r in (*REGIONS, *tables.VIEWS)]

@@ -1,0 +1,128 @@
+"""Volumes as a run keeps them: 256 levels, and read along the rays of a view."""
+
+import zipfile
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from attrs import astuple, field, frozen
+from numpy.typing import NDArray
+
+from matbench.scene import Scene
+from matbench.space import DisparitySpace, Volume
+
+_LEVELS = 255
+
+
+@frozen(eq=False)
+class StoredVolume:
+    """A volume rounded to 255ths.
+
+    Parameters
+    ----------
+    space
+        Its target points.
+    levels
+        (rows, planes, columns) uint8; 255 is 1.
+    views
+        Which of the scene's views the space spans.
+    """
+
+    space: DisparitySpace
+    levels: NDArray[np.uint8] = field()
+    views: tuple[int, ...]
+
+    def __attrs_post_init__(self) -> None:
+        if self.levels.shape != self.space.shape or self.levels.dtype != np.uint8:
+            raise ValueError(f"levels are {self.levels.shape} {self.levels.dtype}, not {self.space.shape} uint8")
+        steps = set(np.diff(self.views).tolist())
+        if len(self.views) != self.space.views or len(steps) != 1 or min(steps) < 1 or self.views[0] < 0:
+            raise ValueError(f"volume spans the views {self.views}, not {self.space.views} evenly spaced ones")
+
+    @classmethod
+    def of(cls, volume: Volume) -> "StoredVolume":
+        """Round a volume, a row at a time.
+
+        Raises
+        ------
+        ValueError
+            If it holds anything but numbers from 0 to 1.
+        """
+        levels = np.empty(volume.values.shape, np.uint8)
+        for row, values in zip(levels, volume.values, strict=True):
+            if not ((values >= -_ROUNDING) & (values <= 1 + _ROUNDING)).all():
+                raise ValueError("the volume holds other things than numbers from 0 to 1")
+            row[:] = np.round(values * np.float32(_LEVELS)).clip(0, _LEVELS)
+        return cls(volume.space, levels, tuple(int(view) for view in volume.views))
+
+    def write(self, path: Path) -> None:
+        """Write it as ``.npz``, compressed."""
+        space = np.array(astuple(self.space), np.int64)
+        np.savez_compressed(path, levels=self.levels, space=space, views=np.array(self.views, np.int64))
+
+    @classmethod
+    def read(cls, path: Path) -> "StoredVolume":
+        """Read what `write` wrote.
+
+        Raises
+        ------
+        ValueError, OSError
+            If it is missing, damaged, or holds something else.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as arrays:
+                space, views = (arrays[name].astype(np.int64).tolist() for name in ("space", "views"))
+                return cls(DisparitySpace(*space), arrays["levels"], tuple(views))
+        except (KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+            raise ValueError(f"{path} holds no volume") from error
+
+    def rays(self, view: int) -> NDArray[np.uint8]:
+        """(rows, planes, width) levels along the rays of one view of the scene, far to near.
+
+        Raises
+        ------
+        ValueError
+            If the volume does not span that view.
+        """
+        return self.space.in_view(self.levels, self.views.index(view)).astype(np.uint8, copy=False)
+
+    def true_planes(self, scene: Scene) -> NDArray[np.float64]:
+        """(H, W) where among the planes the reference view's truth lies, fractional; NaN where unknown."""
+        step = self.views[1] - self.views[0]
+        truth = scene.truth[scene.ref].astype(np.float64)
+        return truth * (step * self.space.fineness) - self.space.first
+
+
+_ROUNDING = 1e-4
+
+
+@frozen(eq=False)
+class Rays:
+    """What a volume holds along the rays of some pixels, and where the surface truly is.
+
+    Parameters
+    ----------
+    materiality
+        (rays, planes) float32 from 0 to 1, plane 0 the farthest.
+    surface
+        (rays,) float64 true place among the planes, fractional.
+    """
+
+    materiality: NDArray[np.float32]
+    surface: NDArray[np.float64]
+
+    @cached_property
+    def before_surface(self) -> NDArray[np.float64]:
+        """(rays, planes) planes by which each point lies before the true surface; negative behind it."""
+        places: NDArray[np.float64] = np.arange(self.materiality.shape[1]) - self.surface[:, None]
+        return places
+
+
+def rays_of(stored: StoredVolume, scene: Scene, masks: Iterable[NDArray[np.bool_]]) -> Iterator[Rays]:
+    """Region by region, the rays of the reference view's pixels where truth is known."""
+    surface = stored.true_planes(scene)
+    levels = np.ascontiguousarray(stored.rays(scene.ref).transpose(0, 2, 1))
+    for mask in masks:
+        chosen = mask & np.isfinite(surface)
+        yield Rays(levels[chosen] * np.float32(1 / _LEVELS), surface[chosen])

@@ -1,0 +1,60 @@
+"""Carrying a disparity map into another view, with a z-buffer."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+TEAR = 1.0
+"""Px in the other view by which two neighbours may differ and still be one surface. Where they
+differ by more, the surface is torn and what lies behind may show through."""
+
+_ROUNDING = 1e-4  # px: float32 rounding does not decide a tie
+
+
+def carry(disparity: NDArray[np.float32], steps: float) -> NDArray[np.float64]:
+    """What the surface of one view looks like from another one.
+
+    A pixel at column x goes to ``x - steps * disparity``. Two neighbours in a row that are one
+    surface (`TEAR`) cover every column between them, linear in disparity, so that a surface that
+    widens leaves no holes; at a tear, or beside an unknown pixel, a pixel covers the column
+    nearest to it. Where several surfaces meet, the nearest counts.
+
+    Parameters
+    ----------
+    disparity
+        (H, W), pixels per view step, NaN where unknown.
+    steps
+        View steps to the other view; negative if it is to the left.
+
+    Returns
+    -------
+    (H, W) float64 disparity at the pixels of the other view, NaN where nothing is carried to.
+    """
+    height, width = disparity.shape
+    values = disparity.astype(np.float64)
+    known = np.isfinite(values)
+    place = np.arange(width) - steps * np.where(known, values, 0.0)
+    whole = known[:, 1:] & known[:, :-1]
+    whole &= np.abs(steps) * np.abs(np.diff(np.where(known, values, 0.0), axis=1)) <= TEAR + _ROUNDING
+    nearest = np.full((height, width), -np.inf)
+
+    def put(rows: NDArray[np.intp], columns: NDArray[np.float64], found: NDArray[np.float64]) -> None:
+        inside = (columns >= 0) & (columns < width)
+        np.maximum.at(nearest, (rows[inside], columns[inside].astype(np.intp)), found[inside])
+
+    torn = known.copy()
+    torn[:, 1:] &= ~whole
+    end = known.copy()
+    end[:, :-1] &= ~whole
+    rows, columns = np.nonzero(torn | end)
+    put(rows, np.floor(place[rows, columns] + 0.5), values[rows, columns])
+    rows, columns = np.nonzero(whole)
+    start, span = place[rows, columns], place[rows, columns + 1] - place[rows, columns]
+    low, rise = values[rows, columns], values[rows, columns + 1] - values[rows, columns]
+    first = np.ceil(start - _ROUNDING)
+    for more in range(int(1 + TEAR) + 1):
+        column = first + more
+        on = (column <= start + span + _ROUNDING) & (span > _ROUNDING)
+        share = (column[on] - start[on]) / span[on]
+        put(rows[on], column[on], low[on] + share * rise[on])
+    nearest[np.isinf(nearest)] = np.nan
+    return nearest
