@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
+from glob import glob
 from pathlib import Path
 
 from matbench import plugins
@@ -13,6 +14,9 @@ from matbench.scene import Scene
 from matbench.spec import Spec, expand, parse
 
 DATA_VARIABLE = "MATBENCH_DATA"
+
+OWN = "folder"
+"""The dataset that loads a scene from the folder of a path; every name that is a path is its."""
 
 
 def data_root(data: str | Path | None = None) -> Path | None:
@@ -31,6 +35,27 @@ def data_root(data: str | Path | None = None) -> Path | None:
         by = "--data" if data else DATA_VARIABLE
         raise UserError(f"data folder {str(root)!r} ({by}) does not exist: name the folder that holds middlebury/")
     return root.resolve()
+
+
+def own_folder(name: str) -> str | None:
+    """The folder that a scene's name means, as it is always written; None if it names no folder.
+
+    A path begins with ``/``, ``.`` or ``~``, or is one that exists and no DATASET/SCENE; written as
+    ``folder/PATH`` it is a path in any case. A relative path is written as ``./PATH`` or ``../PATH``.
+    """
+    prefix, _, rest = name.partition("/")
+    if prefix == OWN and rest:
+        name = rest
+    elif not name.startswith(("/", ".", "~")) and (prefix in plugins.installed("datasets") or not os.path.isdir(name)):  # noqa: PTH112
+        return None
+    path = os.path.normpath(os.path.expanduser(name))  # noqa: PTH111 (as text: what is typed stays recognizable)
+    return path if path.startswith((os.sep, "..")) else os.path.join(".", path)  # noqa: PTH118
+
+
+def _folders(pattern: str) -> list[str]:
+    """The folders that a pattern of paths matches."""
+    found = glob(own_folder(pattern) or pattern)  # noqa: PTH207
+    return [path for path in sorted(found) if os.path.isdir(path)]  # noqa: PTH112
 
 
 def _dataset(prefix: str) -> Dataset:
@@ -70,6 +95,9 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> li
             continue
         known = listings(data)
         hits = [name for name in known if fnmatchcase(name, spec.name)]
+        if not hits and (folders := _folders(spec.name)):
+            names |= {str(Spec(folder, spec.options)): None for folder in folders}
+            continue
         present = [name for name in hits if isinstance(known[name], Listing) and known[name].present]  # type: ignore[union-attr]
         if not present:
             where = "are known but not under the data folder" if hits else "exists"
@@ -87,7 +115,7 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     Parameters
     ----------
     name
-        ``dataset/scene``, options in brackets; one value for each.
+        ``dataset/scene`` or the path of a folder, options in brackets; one value for each.
     data
         The folder of real scenes; without it the one that MATBENCH_DATA names.
 
@@ -99,7 +127,9 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     specs = parse(name)
     if len(specs) != 1:
         raise UserError(f"{name!r} names {len(specs)} scenes: give one value for each option")
+    if (folder := own_folder(specs[0].name)) is not None:
+        return _dataset(OWN).load(folder, specs[0].options, None)
     prefix, slash, rest = specs[0].name.partition("/")
     if not slash or not rest:
-        raise UserError(f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box'")
+        raise UserError(f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box', or a path, ./{name}")
     return _dataset(prefix).load(rest, specs[0].options, data_root(data))

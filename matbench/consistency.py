@@ -1,0 +1,119 @@
+"""Does ground truth explain the images? The other views, sampled where it says, against the reference view.
+
+For a view r with truth d, pixel x and view j, the difference is ``|I_r(x) - I_j(x - (j - r) d)|``,
+averaged over the channels, in grey levels; only where j sees the point. The same is measured with
+the truth shifted by whole pixels of the pair: where truth and images belong together, the truth
+itself leaves the least.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from matbench.regions import seen_from
+from matbench.scene import Scene
+
+SHIFTS = (-1.0, 0.0, 1.0)  # px of the pair
+LEAST_PIXELS = 100  # below, a view says nothing
+
+
+@frozen
+class WarpingError:
+    """How far a view, or several together, differ from the reference view.
+
+    Parameters
+    ----------
+    shifts
+        What was added to the truth, px of the pair.
+    mean, median
+        Absolute difference of colours, grey levels, one for each shift.
+    pixels
+        How many were compared, the same for all shifts; over several views their sum.
+    """
+
+    shifts: tuple[float, ...]
+    mean: tuple[float, ...]
+    median: tuple[float, ...]
+    pixels: int
+
+    def at(self, shift: float) -> float:
+        """The mean at that shift."""
+        return self.mean[self.shifts.index(shift)]
+
+
+def warped(image: NDArray[np.uint8], disparity: NDArray[np.float32], steps: int) -> NDArray[np.float32]:
+    """What the reference view would look like, made from the colours of a view `steps` to the right of it.
+
+    Parameters
+    ----------
+    image
+        (H, W, 3) of that view.
+    disparity
+        (H, W) of the reference view, pixels per view step.
+
+    Returns
+    -------
+    (H, W, 3) float32, cubic between pixels; NaN where the disparity is NaN or leads out of the frame.
+    """
+    import cv2
+
+    height, width = disparity.shape
+    columns = np.arange(width, dtype=np.float32) - np.float32(steps) * disparity
+    rows = np.broadcast_to(np.arange(height, dtype=np.float32)[:, None], (height, width))
+    inside = (columns >= 0) & (columns <= width - 1)  # False for NaN
+    columns = np.where(inside, columns, np.float32(0))
+    border = cv2.BORDER_REPLICATE
+    found = cv2.remap(image.astype(np.float32), columns, rows, cv2.INTER_CUBIC, borderMode=border)
+    found[~inside] = np.nan
+    return np.asarray(found, np.float32)
+
+
+def warping_errors(
+    scene: Scene, truth: NDArray[np.float32] | None = None, shifts: Sequence[float] = SHIFTS
+) -> Mapping[int, WarpingError]:
+    """The differences of every other view from the reference view.
+
+    Parameters
+    ----------
+    truth
+        (H, W) px per view step, NaN where unknown; by default the scene's own.
+
+    Returns
+    -------
+    View index -> its differences; views that share fewer than `LEAST_PIXELS` pixels are left out.
+    """
+    own = scene.truth[scene.ref]
+    truth = own if truth is None else truth
+    exact = scene.visible.get(scene.ref) if truth is own else None
+    reference = scene.views[scene.ref].astype(np.float32)
+    found = {}
+    for view in range(scene.n):
+        steps = view - scene.ref
+        if steps == 0:
+            continue
+        moved = [truth + np.float32(shift / scene.pair_steps) for shift in shifts]
+        pictures = [warped(scene.views[view], disparity, steps) for disparity in moved]
+        seen = exact[view] if exact is not None else seen_from(truth, steps)
+        seen = seen & np.all([np.isfinite(picture[..., 0]) for picture in pictures], axis=0)
+        pixels = int(np.count_nonzero(seen))
+        if pixels < LEAST_PIXELS:
+            continue
+        differences = [np.abs(picture[seen] - reference[seen]).mean(axis=1) for picture in pictures]
+        found[view] = WarpingError(
+            tuple(shifts),
+            tuple(float(np.mean(values, dtype=np.float64)) for values in differences),
+            tuple(float(np.median(values)) for values in differences),
+            pixels,
+        )
+    return found
+
+
+def together(errors: Mapping[int, WarpingError]) -> WarpingError | None:
+    """All views as one, each weighing the same; None if there is none."""
+    if not errors:
+        return None
+    each = list(errors.values())
+    mean, median = (np.mean([getattr(error, name) for error in each], axis=0) for name in ("mean", "median"))
+    return WarpingError(each[0].shifts, tuple(mean.tolist()), tuple(median.tolist()), sum(e.pixels for e in each))
