@@ -35,6 +35,7 @@ MOST_VIEWS = 1000
 _KEYS = ("disparities", "pair_steps", "reference", "truth", "views")
 _TRUTH_KEYS = ("encoding", "file", "scale", "unknown")
 _LARGEST_TOML = 1 << 20
+_LONGEST_NAME = 1000
 
 
 class Folder:
@@ -140,7 +141,7 @@ def _views(path: Path, given: object) -> list[str]:
 
 def _inside(path: Path, folder: Path, name: object) -> Path:
     """The file of that name in the folder or below it; links may not lead out either."""
-    if not (isinstance(name, str) and name):
+    if not (isinstance(name, str) and 0 < len(name) <= _LONGEST_NAME):
         raise UserError(f"{path}: {_said(name)} is no file name")
     try:
         file = folder / name

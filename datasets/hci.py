@@ -67,7 +67,7 @@ class HCI:
         if name not in folders:
             raise UserError(f"{called} is not in {root / 'hci' / _CATEGORY[name] / name}")
         folder, places = folders[name], _places(called, options)
-        truth = {}
+        truth: dict[int, TruthFile] = {}
         for index, place in enumerate(places):
             files = ["gt_disp_lowres.pfm"] if place == SIDE * SIDE // 2 else []
             files.append(f"gt_disp_lowres_Cam{place:03}.pfm")
@@ -77,7 +77,7 @@ class HCI:
             called=called,
             views=tuple(folder / _image(place) for place in places),
             labels=tuple(str(k) for k in range(SIDE)),
-            disparities=_range(folder),
+            disparities=read_range(folder),
             truth=truth,
             column="column" in options,
         )
@@ -109,7 +109,7 @@ def _places(called: str, options: Mapping[str, str]) -> list[int]:
     return [line * SIDE + k if across else k * SIDE + line for k in range(SIDE)]
 
 
-def _range(folder: Path) -> Range:
+def read_range(folder: Path) -> Range:
     """The range to search: as ``parameters.cfg`` says, else `RANGE`.
 
     Raises

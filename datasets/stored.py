@@ -1,6 +1,8 @@
 """Scenes kept as files: which images are its views, and what its truth files mean."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.datasets.choose import reference, view_indices
-from matbench.datasets.images import encoding, read_levels, read_rgb
+from matbench.datasets.images import encoding, read_levels, read_rgb, read_size
 from matbench.datasets.pfm import read_disparities
 from matbench.errors import UserError, unknown
 from matbench.regions import regions
@@ -119,9 +121,11 @@ class StoredScene:
         height, width = images[ref].shape[:2]
         images |= {index: read_rgb(self.views[index], (width, height)) for index in chosen if index != ref}
         truth = {view: file.read((width, height)) for view, file in self.truth.items() if view in images}
-        turned = self._turned()
-        images = {index: turned(image) for index, image in images.items()}
-        truth = {index: turned(values) for index, values in truth.items()}
+        if self.column:
+            # column y of what is turned is row y of the picture: where nearer points move up from one
+            # view to the next below it, they then move left
+            images = {index: np.rot90(image) for index, image in images.items()}
+            truth = {index: np.rot90(values) for index, values in truth.items()}
 
         views = np.zeros((len(self.views), *images[ref].shape), np.uint8)  # those not chosen are dropped below
         for index, image in images.items():
@@ -154,7 +158,22 @@ class StoredScene:
             f"{self.labels[ref]}: the others are at most {max(ref, len(self.views) - 1 - ref)} steps away"
         )
 
-    def _turned(self) -> Callable[[NDArray[np.generic]], NDArray[np.generic]]:
-        # the column y of what is turned is the row y of the picture: where nearer points move up from
-        # one view to the next below it, they then move left
-        return np.rot90 if self.column else np.asarray
+    def problems(self) -> list[str]:
+        """Everything that is wrong with the files, one line each; the size that most views have is right."""
+        found, sizes = [], {}
+        for path in self.views:
+            try:
+                sizes[path] = read_size(path)
+            except UserError as error:
+                found.append(str(error))
+        if not sizes:
+            return found
+        size = self.size or Counter(sizes.values()).most_common(1)[0][0]
+        files: list[Callable[[], object]] = [partial(read_rgb, path, size) for path in sizes]
+        files += [partial(file.read, size) for file in self.truth.values()]
+        for read in files:
+            try:
+                read()
+            except UserError as error:
+                found.append(str(error))
+        return found

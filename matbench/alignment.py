@@ -60,7 +60,7 @@ def match(views: NDArray[np.uint8], ref: int) -> Mapping[int, Matches]:
     import cv2
 
     scale = min(1.0, (PIXELS / (views.shape[1] * views.shape[2])) ** 0.5)
-    finder = cv2.SIFT_create(nfeatures=_FEATURES)
+    finder = cv2.SIFT.create(nfeatures=_FEATURES)
 
     def features(view: int) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
         grey = cv2.cvtColor(views[view], cv2.COLOR_RGB2GRAY)
@@ -161,7 +161,8 @@ def places(matches: Mapping[int, Matches], count: int, ref: int) -> NDArray[np.f
     step = float(np.mean(np.diff(np.sort(ratios[np.isfinite(ratios)]))))
     order = np.arange(count) - ref
     agree = np.nansum(np.sign(ratios) * np.sign(order))
-    return ratios / step if agree >= 0 else -ratios / step
+    found: NDArray[np.float64] = ratios / (step if agree >= 0 else -step)
+    return found
 
 
 def _moves(matches: Mapping[int, Matches], count: int) -> NDArray[np.float64]:
@@ -185,7 +186,7 @@ def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) 
     return float(values[order][np.searchsorted(total, total[-1] / 2)])
 
 
-def disparities(matches: Mapping[int, Matches], steps: Sequence[float]) -> NDArray[np.float64]:
+def disparities(matches: Mapping[int, Matches], steps: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     """Disparities of the matched features, pixels per view step, each once.
 
     Where there are three views or more, only of features on which two of them agree.
@@ -199,10 +200,11 @@ def disparities(matches: Mapping[int, Matches], steps: Sequence[float]) -> NDArr
     usable = np.abs(places) > 0.2
     moves = _moves(matches, len(places))[usable]
     each = -moves / places[usable][:, None]
+    each = each[np.isfinite(each).any(axis=1)]
     each = each[:, np.isfinite(each).any(axis=0)]
     if not each.size:
         return np.zeros(0)
-    middle = np.nanmedian(each, axis=0)
+    middle: NDArray[np.float64] = np.nanmedian(each, axis=0)
     if len(each) == 1:
         return middle
     agree = np.abs(each - middle) <= np.maximum(_AGREE, 0.05 * np.abs(middle))

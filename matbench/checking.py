@@ -18,6 +18,7 @@ NOTED_ROWS, WRONG_ROWS = 0.5, 1.0  # px of vertical misalignment
 NOTED_STEP, WRONG_STEP = 0.12, 0.3  # of a view step, from the view's place
 IN_RANGE = 0.9  # share of matched features that the range must hold
 KNOWN_IN_RANGE = 0.98  # share of the truth
+LEAST_SEEN = 0.1  # share of the truth's points that the other views see, together
 NOTED_SHIFT = 0.5  # px of the pair, from where the truth explains the views best
 CLEARLY = 0.9  # of the warping error: a rival that leaves less explains the views better
 _TRIAL_PIXELS = 200_000  # rivals of the truth are tried on every k-th row
@@ -75,7 +76,9 @@ def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | Non
     known = [view for view in range(scene.n) if np.isfinite(places[view])]
     if (np.diff(places[known]) <= 0).any():
         order = sorted(known, key=lambda view: places[view])
-        return Finding("order", "problem", f"the views do not follow one another: list {_list([names[v] for v in order])}")
+        return Finding(
+            "order", "problem", f"the views do not follow one another: list {_list([names[v] for v in order])}"
+        )
     away = np.abs(places - (np.arange(scene.n) - scene.ref))
     worst = int(np.nanargmax(away))
     text = f"view {names[worst]} was taken {places[worst] - places[scene.ref]:.2f} steps from {names[scene.ref]}"
@@ -140,14 +143,16 @@ def _truth(scene: Scene, name: str) -> Iterator[Finding]:
     held = np.mean((known >= scene.disparities.least - margin) & (known <= scene.disparities.largest + margin))
     if held < KNOWN_IN_RANGE:
         ends = f"{known.min():g} .. {known.max():g}"
-        text = f"{100 * (1 - held):.0f} % of it lies outside the range {scene.disparities}: it is {ends} px per view step"
+        text = (
+            f"{100 * (1 - held):.0f} % of it lies outside the range {scene.disparities}: it is {ends} px per view step"
+        )
         yield Finding(topic, "problem", text)
     error = together(warping_errors(scene))
-    if error is None:
-        yield Finding(topic, "problem", "it leads out of every other view: is its scale right?")
+    if error is None or error.pixels < LEAST_SEEN * (scene.n - 1) * known.size:
+        yield Finding(topic, "problem", "it leads out of the other views nearly everywhere: is its scale right?")
         return
     at = error.mean
-    said = f"warped views differ by {at[1]:.2f} grey levels; by {at[0]:.2f} with it 1 px (of the pair) less, {at[2]:.2f} more"
+    said = f"warped views differ by {at[1]:.2f} grey levels, {at[0]:.2f} and {at[2]:.2f} with it 1 px of the pair off"
     rival = _better(scene)
     if rival is not None:
         yield Finding(topic, "problem", f"{said}. The views are explained better {rival}")
@@ -169,18 +174,18 @@ def _vertex(error: WarpingError) -> float:
 def _better(scene: Scene) -> str | None:
     """What explains the views clearly better than the truth as it is, in words; None if nothing does."""
     truth = scene.truth[scene.ref]
-    flat = np.where(np.isfinite(truth), np.nanmedian(truth), np.float32(np.nan)).astype(np.float32)
-    pair = np.float32(scene.pair_steps)
+    flat = np.where(np.isfinite(truth), np.nanmedian(truth), np.nan).astype(np.float32)
+    pair, two = np.float32(scene.pair_steps), np.float32(2)
     rivals: dict[str, Callable[[], NDArray[np.float32]]] = {
         "with its sign reversed: nearer must be larger, and views listed from left to right": lambda: -truth,
         "with it turned upside down: rows of a PFM file go from bottom to top": lambda: truth[::-1],
         "with it mirrored": lambda: truth[:, ::-1],
-        "with half of it: is its scale right?": lambda: truth / 2,
-        "with twice of it: is its scale right?": lambda: truth * 2,
+        "with half of it: is its scale right?": lambda: truth / two,
+        "with twice of it: is its scale right?": lambda: truth * two,
         "with one disparity for all pixels: it is not the truth of these images": lambda: flat,
     }
     if scene.pair_steps != 1:
-        rivals[f"with it divided by {pair:g}, the pair's steps: truth is in pixels per view step"] = lambda: truth / pair
+        rivals[f"with it divided by {pair:g}, the steps of the pair: truth is per view step"] = lambda: truth / pair
     step = max(1, -(-truth.size // _TRIAL_PIXELS))
     thin = evolve(
         scene,

@@ -44,6 +44,8 @@ app = App(
 `matbench list`  methods with their parameters, scenes, metrics
 
 `matbench view runs/1a2b3c4d`  open a recording
+
+`matbench scene check my_scene`  a scene of your own, a folder: is it what it says?
 """,
     help_format="markdown",
     version=__version__,
@@ -242,6 +244,9 @@ def _print_tables(results: Any, cells: Any, switches: Any, metric: str, console:
             console.print(table)
 
 
+app.command("matbench.commands.scene:app", name="scene", help="Look at scenes, check them, and make your own.")
+
+
 @app.command(name="list", help_epilogue="")
 def list_(
     *,
@@ -287,14 +292,14 @@ def view(
     Parameters
     ----------
     run
-        Run folder that was written with `compare --record`.
+        Run folder that was written with `compare --record`, or a recording, such as of `scene show --record`.
     cell
         Part of the cell's name or key; not needed where there is only one recording.
     """
     from matbench import recording
     from matbench.store import Store
 
-    recording.view(Store(run).recording(cell), web)
+    recording.view(run if run.suffix == ".rrd" else Store(run).recording(cell), web)
     return DONE
 
 

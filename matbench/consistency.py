@@ -84,9 +84,7 @@ def warping_errors(
     -------
     View index -> its differences; views that share fewer than `LEAST_PIXELS` pixels are left out.
     """
-    own = scene.truth[scene.ref]
-    truth = own if truth is None else truth
-    exact = scene.visible.get(scene.ref) if truth is own else None
+    truth = scene.truth[scene.ref] if truth is None else truth
     reference = scene.views[scene.ref].astype(np.float32)
     found = {}
     for view in range(scene.n):
@@ -95,8 +93,7 @@ def warping_errors(
             continue
         moved = [truth + np.float32(shift / scene.pair_steps) for shift in shifts]
         pictures = [warped(scene.views[view], disparity, steps) for disparity in moved]
-        seen = exact[view] if exact is not None else seen_from(truth, steps)
-        seen = seen & np.all([np.isfinite(picture[..., 0]) for picture in pictures], axis=0)
+        seen = _seen(scene, truth, view) & np.all([np.isfinite(picture[..., 0]) for picture in pictures], axis=0)
         pixels = int(np.count_nonzero(seen))
         if pixels < LEAST_PIXELS:
             continue
@@ -108,6 +105,30 @@ def warping_errors(
             pixels,
         )
     return found
+
+
+def left_over(scene: Scene) -> NDArray[np.float32]:
+    """What warping leaves at each pixel of the reference view: the mean difference of the views that see it.
+
+    Returns
+    -------
+    (H, W) float32, grey levels; NaN where truth is unknown or no other view sees the point.
+    """
+    truth, reference = scene.truth[scene.ref], scene.views[scene.ref].astype(np.float32)
+    total, count = np.zeros(truth.shape), np.zeros(truth.shape)
+    for view in range(scene.n):
+        if view != scene.ref:
+            difference = np.abs(warped(scene.views[view], truth, view - scene.ref) - reference).mean(axis=2)
+            seen = _seen(scene, truth, view) & np.isfinite(difference)
+            total[seen] += difference[seen]
+            count[seen] += 1
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)
+
+
+def _seen(scene: Scene, truth: NDArray[np.float32], view: int) -> NDArray[np.bool_]:
+    """(H, W): does another view see the reference view's points? Exact where that is known."""
+    exact = scene.visible.get(scene.ref) if truth is scene.truth[scene.ref] else None
+    return seen_from(truth, view - scene.ref) if exact is None else exact[view]
 
 
 def together(errors: Mapping[int, WarpingError]) -> WarpingError | None:

@@ -131,5 +131,7 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
         return _dataset(OWN).load(folder, specs[0].options, None)
     prefix, slash, rest = specs[0].name.partition("/")
     if not slash or not rest:
-        raise UserError(f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box', or a path, ./{name}")
+        raise UserError(
+            f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box', or a path, ./{name}"
+        )
     return _dataset(prefix).load(rest, specs[0].options, data_root(data))

@@ -1,0 +1,1 @@
+"""Commands of their own modules, imported when they are typed."""
