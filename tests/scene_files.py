@@ -53,3 +53,8 @@ class Layers:
 
     def truth(self, across: float = 0.0, down: float = 0.0) -> NDArray[np.float32]:
         return np.where(self._on_board(across, down), self.near, self.far).astype(np.float32)
+
+
+def check_one_line(error: Exception) -> None:
+    """What a user is told is one line."""
+    assert len(str(error).splitlines()) == 1, error

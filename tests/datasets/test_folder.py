@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scene_files import Layers, pfm_bytes, write_png
+from scene_files import Layers, check_one_line, pfm_bytes, write_png
 
 from matbench import load_scene
 from matbench.datasets.folder import describe, labels
@@ -91,9 +91,7 @@ def test_reference_and_pair(folder: Path) -> None:
     text = f"{MINIMAL}pair_steps = 2\nreference = 'left.png'\n[truth.left]\nfile='map.pfm'\n[truth.middle]\nfile='map.pfm'\n"
     scene = load_scene(_write(folder, text))
     assert (scene.ref, scene.pair_steps) == (0, 2)
-    _refused(
-        folder, text.replace("'left.png'\n", "'middle'\n", 1).replace("pair_steps = 2", "pair_steps = 2"), "pair_steps"
-    )
+    _refused(folder, text.replace("'left.png'\n", "'middle'\n", 1), "pair_steps")
     assert load_scene(_write(folder, text) + "[views=0+2]").pair_steps == 1
     with pytest.raises(UserError, match="unknown option"):
         load_scene(f"{folder}[size=half]")
@@ -205,7 +203,7 @@ def test_a_folder_is_named_as_any_path(folder: Path, monkeypatch: pytest.MonkeyP
     _write(folder, MINIMAL)
     monkeypatch.chdir(folder.parent)
     monkeypatch.setenv("HOME", str(folder.parent))
-    os.rename("my scene", "desk")
+    folder.rename("desk")
     for name in (
         "desk",
         "./desk",
@@ -278,7 +276,7 @@ def test_any_toml_is_a_right_scene_or_one_line(folder: Path, content: bytes) -> 
     try:
         scene = load_scene(str(folder))
     except UserError as error:
-        assert len(str(error).splitlines()) == 1
+        check_one_line(error)
     else:
         assert scene.n >= 2
         assert np.isfinite([scene.disparities.least, scene.disparities.largest]).all()

@@ -100,7 +100,7 @@ def test_nothing_is_overwritten_unasked(folder: Path) -> None:
     assert load_scene(str(folder)).n == 5
     (folder / "scene.toml").unlink()
     (folder / "calib.txt").write_text("ndisp=20")
-    with pytest.raises(UserError, match="calib.txt"):
+    with pytest.raises(UserError, match=r"calib\.txt"):
         write(folder)
 
 
