@@ -24,7 +24,7 @@ from typing import Any
 from matbench.dataset import Listing
 from matbench.datasets.images import encoding, read_bytes
 from matbench.datasets.pair import CALIBRATION, pair
-from matbench.datasets.stored import StoredScene, TruthFile
+from matbench.datasets.stored import StoredScene, TruthFile, inside
 from matbench.errors import UserError, unknown
 from matbench.scene import Range, Scene
 from matbench.spec import first_line
@@ -140,17 +140,12 @@ def _views(path: Path, given: object) -> list[str]:
 
 
 def _inside(path: Path, folder: Path, name: object) -> Path:
-    """The file of that name in the folder or below it; links may not lead out either."""
     if not (isinstance(name, str) and 0 < len(name) <= _LONGEST_NAME):
         raise UserError(f"{path}: {_said(name)} is no file name")
     try:
-        file = folder / name
-        is_inside = file.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError, ValueError):  # too long, links in a circle, a null character
-        raise UserError(f"{path}: {_said(name)} is no file name") from None
-    if not is_inside:
-        raise UserError(f"{path}: {_said(name)} leads out of the folder: images and truth must lie in it")
-    return file
+        return inside(folder, name)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
 
 
 def _disparities(path: Path, given: object) -> Range:

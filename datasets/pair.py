@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 from matbench.datasets.images import read_bytes
-from matbench.datasets.stored import StoredScene, TruthFile
+from matbench.datasets.stored import StoredScene, TruthFile, inside
 from matbench.errors import UserError
 from matbench.scene import Range
 
@@ -32,14 +32,15 @@ def pair(called: str, folder: Path) -> StoredScene:
     facts = _facts(path)
     count = _whole(path, facts, "ndisp")
     size = (_whole(path, facts, "width"), _whole(path, facts, "height")) if "width" in facts else None
-    truth = {view: TruthFile(file) for view in (0, 1) if (file := folder / f"disp{view}.pfm").is_file()}
+    maps = {view: f"disp{view}.pfm" for view in (0, 1)}
+    truth = {view: TruthFile(inside(folder, name)) for view, name in maps.items() if (folder / name).is_file()}
     views = tuple(_view(folder, view) for view in (0, 1))
     return StoredScene(called, views, ("0", "1"), Range(0, count - 1), truth, size=size)
 
 
 def _view(folder: Path, view: int) -> Path:
-    files = [folder / f"im{view}{end}" for end in (".png", ".ppm", ".pgm")]
-    return next((file for file in files if file.is_file()), files[0])
+    names = [f"im{view}{end}" for end in (".png", ".ppm", ".pgm")]
+    return inside(folder, next((name for name in names if (folder / name).is_file()), names[0]))
 
 
 def _facts(path: Path) -> dict[str, str]:

@@ -20,6 +20,7 @@ from matbench.scene import Range
 from matbench.store import write_text
 
 _IMAGES = (".png", ".ppm", ".pgm")
+_NOT_READ = (".bmp", ".exr", ".gif", ".jpeg", ".jpg", ".tif", ".tiff", ".webp")
 _NO_VIEW = re.compile(r"disp(?!lay)|depth|truth|mask|n?o?nocc|(^|[^a-z])gt([^a-z]|$)", re.IGNORECASE)
 _MEASURED = 24  # at most so many views are matched; order is told only where that is all of them
 _SURE = 40  # matched features from which a range is guessed
@@ -102,7 +103,11 @@ def _views(folder: Path) -> tuple[list[str], list[str]]:
             remarks.append(f"left out: {name!r}, whose name is no text")
     if len(sizes) < 2:
         found = ", ".join(sizes) or "none"
-        raise UserError(f"{folder} has too few images: at least two views (PNG, or binary PPM or PGM), found: {found}")
+        others = sorted({path.suffix for path in folder.iterdir() if path.suffix.lower() in _NOT_READ})
+        hint = f"; {', '.join(others)} are not read: save them as PNG" if others else ""
+        raise UserError(
+            f"{folder} has too few images: at least two views (PNG, or binary PPM or PGM), found: {found}{hint}"
+        )
     size = Counter(sizes.values()).most_common(1)[0][0]
     names = [name for name in sizes if sizes[name] == size]
     remarks += [f"left out: {name}, {w}x{h} px" for name, (w, h) in sizes.items() if (w, h) != size]

@@ -18,6 +18,24 @@ from matbench.regions import regions
 from matbench.scene import Range, Scene
 
 
+def inside(folder: Path, name: str) -> Path:
+    """The file of that name in a folder or below it; neither the name nor a link may lead out.
+
+    Raises
+    ------
+    UserError
+        If it does, or no file can have that name.
+    """
+    try:
+        file = folder / name
+        is_inside = file.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # too long, links in a circle, a null character
+        raise UserError(f"{name!r} is no file name") from None
+    if not is_inside:
+        raise UserError(f"{name!r} leads out of the folder {folder}: images and truth must lie in it")
+    return file
+
+
 @frozen
 class TruthFile:
     """A file of true disparities: PFM, or a grey PNG or PGM of 8 or 16 bits.

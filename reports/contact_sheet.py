@@ -168,7 +168,7 @@ def _left_over(scene: Scene, view: int) -> Tile:
     picture = colors(difference, (0, _WORST), ERROR)
     picture[~np.isfinite(difference)] = UNKNOWN
     mean = f"{np.nanmean(difference):.1f}" if np.isfinite(difference).any() else "no"
-    return Tile(picture, f"difference to the views warped by it: {mean} grey levels (pale: {_WORST}+)")
+    return Tile(picture, f"left by warping: {mean} grey levels (pale: {_WORST}+)")
 
 
 def _spread(views: Iterable[int], ref: int) -> list[int]:

@@ -88,7 +88,8 @@ def test_truth_in_every_encoding(folder: Path, facts: str, view: str) -> None:
 
 
 def test_reference_and_pair(folder: Path) -> None:
-    text = f"{MINIMAL}pair_steps = 2\nreference = 'left.png'\n[truth.left]\nfile='map.pfm'\n[truth.middle]\nfile='map.pfm'\n"
+    truth = "[truth.left]\nfile = 'map.pfm'\n[truth.middle]\nfile = 'map.pfm'\n"
+    text = f"{MINIMAL}pair_steps = 2\nreference = 'left.png'\n{truth}"
     scene = load_scene(_write(folder, text))
     assert (scene.ref, scene.pair_steps) == (0, 2)
     _refused(folder, text.replace("'left.png'\n", "'middle'\n", 1), "pair_steps")

@@ -90,6 +90,14 @@ def test_a_malformed_calibration_is_refused(folder: Path, text: str, words: list
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["im1.png", "disp0.pfm"])
+def test_links_that_lead_out_are_refused(folder: Path, name: str) -> None:
+    (folder / name).rename(folder.parent / name)
+    (folder / name).symlink_to(folder.parent / name)
+    with pytest.raises(UserError, match="leads out of the folder"):
+        load_scene(str(folder))
+
+
 def test_a_missing_view_is_named(folder: Path) -> None:
     (folder / "im1.png").unlink()
     with pytest.raises(UserError, match=r"im1\.png is missing"):

@@ -124,7 +124,8 @@ def test_names_that_need_quoting(tmp_path: Path, scene: Scene) -> None:
 def test_too_few_images_are_refused(tmp_path: Path, scene: Scene, names: list[str]) -> None:
     for name in names:
         write_png(tmp_path / name, scene.views[0])
-    with pytest.raises(UserError, match="too few images"):
+    (tmp_path / "photo.JPG").write_bytes(b"")
+    with pytest.raises(UserError, match=r"too few images.*\.JPG are not read: save them as PNG"):
         write(tmp_path)
     assert not (tmp_path / "scene.toml").exists()
     with pytest.raises(UserError, match="does not exist"):
