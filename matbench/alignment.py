@@ -104,7 +104,7 @@ class Rows:
     Parameters
     ----------
     offset
-        By how much its points lie lower, median, px.
+        By how much its points lie lower, in their middle, px.
     worst
         The largest misalignment anywhere between the points, px: of a plane fitted to them, so that
         turned and scaled views are told from false matches.
@@ -129,7 +129,7 @@ def rows(matches: Matches) -> Rows | None:
         plane, *_ = np.linalg.lstsq(design[keep], matches.down[keep], rcond=None)
         left = matches.down - design @ plane
         keep = np.abs(left) <= max(0.25, _TRIM * _deviation(left[keep]))
-    return Rows(offset, float(np.quantile(np.abs(design[keep] @ plane), 0.98)))
+    return Rows(float(plane[0]), float(np.quantile(np.abs(design[keep] @ plane), 0.98)))
 
 
 def _deviation(values: NDArray[np.float64]) -> float:
@@ -159,8 +159,7 @@ def places(matches: Mapping[int, Matches], count: int, ref: int) -> NDArray[np.f
         if view != base and both.sum() >= ENOUGH:
             ratios[view] = _weighted_median(moves[view][both] / moves[base][both], np.abs(moves[base][both]))
     step = float(np.mean(np.diff(np.sort(ratios[np.isfinite(ratios)]))))
-    order = np.arange(count) - ref
-    agree = np.nansum(np.sign(ratios) * np.sign(order))
+    agree = np.nansum(ratios * (np.arange(count) - ref))
     found: NDArray[np.float64] = ratios / (step if agree >= 0 else -step)
     return found
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from matbench import alignment
 from matbench.alignment import Matches
-from matbench.consistency import WarpingError, together, warping_errors
+from matbench.consistency import WarpingError, picture_columns, together, warping_errors
 from matbench.scene import Scene
 
 Verdict = Literal["good", "note", "problem", "unknown"]
@@ -21,6 +21,7 @@ KNOWN_IN_RANGE = 0.98  # share of the truth
 LEAST_SEEN = 0.1  # share of the truth's points that the other views see, together
 NOTED_SHIFT = 0.5  # px of the pair, from where the truth explains the views best
 CLEARLY = 0.9  # of the warping error: a rival that leaves less explains the views better
+_CLEAR_SHARE = 0.3  # by which one direction must hold more features than the other
 _TRIAL_PIXELS = 200_000  # rivals of the truth are tried on every k-th row
 
 
@@ -55,9 +56,14 @@ def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Finding]
     called = list(names or scene.labels)
     matches = alignment.match(scene.views, scene.ref)
     places = alignment.places(matches, scene.n, scene.ref)
+    steps = (np.arange(scene.n) - scene.ref).astype(np.float64) if places is None else places
+    found = alignment.disparities(matches, steps)
+    if places is not None and not _follow(places) and _inside(scene, -found) > _inside(scene, found) + _CLEAR_SHARE:
+        places, found = -places, -found  # no order at all has no direction either: that of the range
     yield _order(scene, called, places)
-    yield _direction(scene, matches, places)
+    yield _direction(scene, found)
     yield _rows(matches, called)
+    yield from _borders(scene, called)
     if not scene.truth:
         yield Finding("truth", "note", "there is none: methods can be run and looked at, not scored")
     for view in sorted(scene.truth):
@@ -68,13 +74,26 @@ def _list(names: Sequence[str]) -> str:
     return ", ".join(names)
 
 
+def _follow(places: NDArray[np.float64]) -> bool:
+    """Do the views lie from one side to the other?"""
+    return bool((np.diff(places[np.isfinite(places)]) > 0).all())
+
+
+def _inside(scene: Scene, disparities: NDArray[np.float64]) -> float:
+    """The share of disparities that the scene's range holds, with a margin."""
+    least, largest = scene.disparities.least, scene.disparities.largest
+    margin = max(0.5, 0.05 * (largest - least))
+    held = (disparities >= least - margin) & (disparities <= largest + margin)
+    return float(np.mean(held)) if len(held) else 0.0
+
+
 def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | None) -> Finding:
     if scene.n == 2:
         return Finding("order", "good", "two views: their order is what the direction of the shift shows")
     if places is None or np.isfinite(places).sum() < 3:
         return Finding("order", "unknown", "too few features are found again in other views to tell their order")
     known = [view for view in range(scene.n) if np.isfinite(places[view])]
-    if (np.diff(places[known]) <= 0).any():
+    if not _follow(places):
         order = sorted(known, key=lambda view: places[view])
         return Finding(
             "order", "problem", f"the views do not follow one another: list {_list([names[v] for v in order])}"
@@ -91,31 +110,23 @@ def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | Non
     return Finding("order", "good", f"from one side to the other, within {away[worst]:.2f} of a step{unsure}")
 
 
-def _direction(scene: Scene, matches: Mapping[int, Matches], places: NDArray[np.float64] | None) -> Finding:
-    steps = (np.arange(scene.n) - scene.ref).astype(float) if places is None else places
-    found = alignment.disparities(matches, steps)
+def _direction(scene: Scene, found: NDArray[np.float64]) -> Finding:
     if len(found) < alignment.ENOUGH:
         return Finding("shift", "unknown", "too few features are found again in other views to tell their disparities")
-    least, largest = scene.disparities.least, scene.disparities.largest
-    margin = max(0.5, 0.05 * (largest - least))
-
-    def inside(values: NDArray[np.float64]) -> float:
-        return float(np.mean((values >= least - margin) & (values <= largest + margin)))
-
+    inside, mirrored = _inside(scene, found), _inside(scene, -found)
     low, high = np.quantile(found, (0.02, 0.98))
     measured = f"features have {low:.1f} .. {high:.1f} px per view step"
-    if inside(found) >= IN_RANGE:
-        both = least < 0 < largest and inside(-found) >= IN_RANGE
-        unsure = "; the range holds either direction, so that only truth can tell it" if both else ""
+    if inside >= IN_RANGE:
+        unsure = "; the range holds either direction, so that only truth can tell it" if mirrored >= IN_RANGE else ""
         return Finding("shift", "good", f"{measured}, the range is {scene.disparities}{unsure}")
-    if inside(-found) >= max(IN_RANGE, inside(found) + 0.3):
+    if mirrored >= max(IN_RANGE, inside + _CLEAR_SHARE):
         return Finding(
             "shift",
             "problem",
             f"points move the wrong way: {measured}, the range is {scene.disparities}. Views must be listed from left "
             "to right, so that nearer points move left from one view to the next: list them the other way round",
         )
-    share = f"{100 * (1 - inside(found)):.0f} %"
+    share = f"{100 * (1 - inside):.0f} %"
     return Finding("shift", "problem", f"{share} of them lie outside the range {scene.disparities}: {measured}")
 
 
@@ -133,6 +144,16 @@ def _rows(matches: Mapping[int, Matches], names: Sequence[str]) -> Finding:
     text += f"{turned}: up to {rows.worst:.2f} px between rows"
     wrong = rows.worst > WRONG_ROWS
     return Finding("rows", "problem" if wrong else "note", text + ("; rectify the views first" if wrong else ""))
+
+
+def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
+    lost = {}
+    for name, view in zip(names, scene.views, strict=True):
+        first, last = picture_columns(view)
+        lost[name] = scene.width - 1 - last + first
+    black = ", ".join(f"{name} ({count})" for name, count in lost.items() if count)
+    if black:
+        yield Finding("borders", "note", f"views end in black columns, which match nothing: {black}")
 
 
 def _truth(scene: Scene, name: str) -> Iterator[Finding]:

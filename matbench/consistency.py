@@ -43,6 +43,15 @@ class WarpingError:
         return self.mean[self.shifts.index(shift)]
 
 
+def picture_columns(image: NDArray[np.uint8]) -> tuple[int, int]:
+    """The first and the last column that is not black from top to bottom: rectified views may end before their frame.
+
+    Of an image that is all black, all of it.
+    """
+    lit = np.flatnonzero(image.any(axis=(0, 2)))
+    return (int(lit[0]), int(lit[-1])) if len(lit) else (0, image.shape[1] - 1)
+
+
 def warped(image: NDArray[np.uint8], disparity: NDArray[np.float32], steps: int) -> NDArray[np.float32]:
     """What the reference view would look like, made from the colours of a view `steps` to the right of it.
 
@@ -55,14 +64,16 @@ def warped(image: NDArray[np.uint8], disparity: NDArray[np.float32], steps: int)
 
     Returns
     -------
-    (H, W, 3) float32, cubic between pixels; NaN where the disparity is NaN or leads out of the frame.
+    (H, W, 3) float32, cubic between pixels; NaN where the disparity is NaN or leads out of the
+    frame, or into its black border (`picture_columns`).
     """
     import cv2
 
     height, width = disparity.shape
     columns = np.arange(width, dtype=np.float32) - np.float32(steps) * disparity
     rows = np.broadcast_to(np.arange(height, dtype=np.float32)[:, None], (height, width))
-    inside = (columns >= 0) & (columns <= width - 1)  # False for NaN
+    first, last = picture_columns(image)
+    inside = (columns >= first) & (columns <= last)  # False for NaN
     columns = np.where(inside, columns, np.float32(0))
     border = cv2.BORDER_REPLICATE
     found = cv2.remap(image.astype(np.float32), columns, rows, cv2.INTER_CUBIC, borderMode=border)
@@ -126,9 +137,12 @@ def left_over(scene: Scene) -> NDArray[np.float32]:
 
 
 def _seen(scene: Scene, truth: NDArray[np.float32], view: int) -> NDArray[np.bool_]:
-    """(H, W): does another view see the reference view's points? Exact where that is known."""
+    """(H, W): does another view see the reference view's points? Exact where that is known; no black border."""
     exact = scene.visible.get(scene.ref) if truth is scene.truth[scene.ref] else None
-    return seen_from(truth, view - scene.ref) if exact is None else exact[view]
+    seen = seen_from(truth, view - scene.ref) if exact is None else exact[view].copy()
+    first, last = picture_columns(scene.views[scene.ref])
+    seen[:, :first] = seen[:, last + 1 :] = False
+    return seen
 
 
 def together(errors: Mapping[int, WarpingError]) -> WarpingError | None:

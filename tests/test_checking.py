@@ -52,12 +52,15 @@ def test_real_scenes_have_no_problem(data_root: Path, name: str) -> None:
     assert {"order", "shift", "rows"} < {finding.topic for finding in found}
 
 
-def test_views_in_the_wrong_order_are_named_in_the_right_one(scene: Scene) -> None:
-    shuffled = [0, 3, 2, 1, 4, 5]
+@pytest.mark.parametrize(
+    ("shuffled", "right"), [([0, 3, 2, 1, 4, 5], "0, 3, 2, 1, 4, 5"), ([5, 3, 4, 2, 0, 1], "4, 5, 3, 1, 2, 0")]
+)
+def test_views_in_the_wrong_order_are_named_in_the_right_one(scene: Scene, shuffled: list[int], right: str) -> None:
     wrong = evolve(scene, views=scene.views[shuffled], truth={}, visible={}, regions={}, ref=2)
-    finding = _found(wrong)["order"]
-    assert finding.verdict == "problem"
-    assert "list 0, 3, 2, 1, 4, 5" in finding.text
+    found = _found(wrong)
+    assert found["order"].verdict == "problem"
+    assert found["order"].text.endswith(f"list {right}")
+    assert found["shift"].verdict == "good"
 
 
 def test_views_from_right_to_left_are_told(scene: Scene) -> None:
@@ -124,6 +127,14 @@ def test_truth_that_leads_out_of_the_frame_is_told(scene: Scene) -> None:
     truth = np.full_like(scene.truth[scene.ref], 300)
     wrong = evolve(scene, truth={scene.ref: truth}, visible={}, regions={}, disparities=Range(0, 310))
     _only_problem(wrong, f"truth of {scene.ref}", "leads out")
+
+
+def test_black_borders_are_noted(scene: Scene) -> None:
+    views = scene.views.copy()
+    views[0, :, :20] = 0
+    finding = _found(evolve(scene, views=views, truth={}, visible={}, regions={}))["borders"]
+    assert finding.verdict == "note"
+    assert "0 (20)" in finding.text
 
 
 def test_views_without_features_say_so() -> None:

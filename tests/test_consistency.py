@@ -8,7 +8,7 @@ from attrs import evolve
 from scene_files import Layers
 
 from matbench import load_scene
-from matbench.consistency import left_over, together, warped, warping_errors
+from matbench.consistency import left_over, picture_columns, together, warped, warping_errors
 from matbench.regions import seen_from
 from matbench.scene import Range, Scene
 
@@ -75,6 +75,18 @@ def test_the_truth_explains_and_its_neighbours_do_not() -> None:
     wrong = together(warping_errors(_scene(), _scene().truth[2] + np.float32(1)))
     assert wrong is not None
     assert wrong.at(-1) < 0.3 * wrong.at(0)
+
+
+def test_black_borders_are_no_picture() -> None:
+    scene = _scene()
+    views = scene.views.copy()
+    views[1, :, :7] = views[4, :, 90:] = views[2, :, :3] = 0
+    assert [picture_columns(view) for view in views] == [(0, 95), (7, 95), (3, 95), (0, 95), (0, 89)]
+    assert picture_columns(np.zeros((2, 9, 3), np.uint8)) == (0, 8)
+    clean, black = warping_errors(scene), warping_errors(evolve(scene, views=views))
+    for view in clean:
+        assert black[view].at(0) == pytest.approx(clean[view].at(0), rel=0.15)
+    assert np.isnan(left_over(evolve(scene, views=views))[:, :3]).all()
 
 
 def test_a_shift_is_a_pixel_of_the_pair() -> None:
