@@ -4,9 +4,11 @@ Decoders fill what is missing with grey and go on, so a file's completeness is c
 """
 
 import re
+import stat
 import zlib
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +18,12 @@ from matbench.errors import UserError
 LARGEST = 64_000_000
 """Most pixels of an image. What claims more is damaged, or meant to exhaust memory."""
 
+LARGEST_FILE = 1 << 30
+"""Most bytes of a file that is read into memory."""
+
 _PNG = b"\x89PNG\r\n\x1a\n"
-_PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # colour type -> samples of a pixel
+_PNG_GREY = 0
+_PNG_CHANNELS = {_PNG_GREY: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # colour type -> samples of a pixel
 _PNM = re.compile(rb"P([56])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})\s")
 
 
@@ -40,11 +46,8 @@ def read_rgb(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint
     UserError
         If it is missing, of another kind, truncated, damaged or of another size.
     """
-    data = _read(path)
-    width, height = _size(path, data)
-    if size is not None and (width, height) != size:
-        raise UserError(f"image {path} is {width}x{height} px, not {size[0]}x{size[1]} as the others of its scene")
-    return _decode_png(path, data) if data.startswith(_PNG) else _decode_pnm(path, data)
+    image: NDArray[np.uint8] = _read_image(path, size, 8)
+    return image
 
 
 def read_grey(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
@@ -61,6 +64,50 @@ def read_grey(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uin
     return np.ascontiguousarray(image[..., 0])
 
 
+def read_levels(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint16]:
+    """Read the levels of a grey image of 8 or 16 bits, as they are stored.
+
+    Returns
+    -------
+    (H, W) uint16.
+
+    Raises
+    ------
+    UserError
+        As `read_grey`, and if the decoder would spread fewer than 8 bits over 256 levels.
+    """
+    image = _read_image(path, size, 16)
+    if (image != image[..., :1]).any():
+        raise UserError(f"image {path} is coloured: ground truth is one grey level a pixel")
+    return image[..., 0].astype(np.uint16)
+
+
+def encoding(path: Path) -> str:
+    """How a file of ground truth stores its numbers, by its header: ``grey8``, ``grey16`` or ``pfm``.
+
+    Raises
+    ------
+    UserError
+        If it is missing, or of no such kind.
+    """
+    data = read_bytes(path, "ground truth", first=4096)
+    if data[:2] in (b"Pf", b"PF"):
+        return "pfm"
+    _size(path, data)
+    found = _PNM.match(data)
+    is_deep = int(found[4]) > 255 if found else data[24] > 8
+    return "grey16" if is_deep else "grey8"
+
+
+def _read_image(path: Path, size: tuple[int, int] | None, bits: int) -> NDArray[Any]:
+    """(H, W, 3) uint8 or uint16, RGB, of at most so many bits a channel."""
+    data = read_bytes(path)
+    width, height = _size(path, data)
+    if size is not None and (width, height) != size:
+        raise UserError(f"image {path} is {width}x{height} px, not {size[0]}x{size[1]} as the others of its scene")
+    return _decode_png(path, data, bits) if data.startswith(_PNG) else _decode_pnm(path, data, bits)
+
+
 def read_size(path: Path) -> tuple[int, int]:
     """(width, height) that the file's header states.
 
@@ -69,7 +116,7 @@ def read_size(path: Path) -> tuple[int, int]:
     UserError
         If the file is missing or has no such header.
     """
-    return _size(path, _read(path, 4096))
+    return _size(path, read_bytes(path, first=4096))
 
 
 def pixel_digests(path: Path) -> set[str]:
@@ -99,14 +146,28 @@ def has_pixels(path: Path, digest: str) -> bool:
         return False
 
 
-def _read(path: Path, limit: int = -1) -> bytes:
+def read_bytes(path: Path, what: str = "image", limit: int = LARGEST_FILE, first: int = -1) -> bytes:
+    """The bytes of a regular file, or the `first` of them.
+
+    Raises
+    ------
+    UserError
+        If it is missing, larger than `limit`, or no file: a pipe would never end.
+    """
     try:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):
+            raise UserError(f"{what} {path} cannot be read: it is no file")
+        if found.st_size > limit:
+            raise UserError(f"{what} {path} has {found.st_size} bytes: {limit} are possible")
         with path.open("rb") as file:
-            return file.read(limit)
+            return file.read(first)
     except FileNotFoundError:
-        raise UserError(f"image {path} is missing") from None
+        raise UserError(f"{what} {path} is missing") from None
+    except ValueError:  # a null character
+        raise UserError(f"{what} {str(path)!r} is missing: no file can have that name") from None
     except OSError as error:
-        raise UserError(f"image {path} cannot be read: {error.strerror}") from None
+        raise UserError(f"{what} {path} cannot be read: {error.strerror}") from None
 
 
 def _size(path: Path, data: bytes) -> tuple[int, int]:
@@ -125,28 +186,33 @@ def _size(path: Path, data: bytes) -> tuple[int, int]:
     return width, height
 
 
-def _decode_pnm(path: Path, data: bytes) -> NDArray[np.uint8]:
+def _decode_pnm(path: Path, data: bytes, bits: int) -> NDArray[Any]:
     found = _PNM.match(data)
     assert found is not None, "`_size` has matched it"  # noqa: S101
     width, height, channels = int(found[2]), int(found[3]), 3 if found[1] == b"6" else 1
-    if int(found[4]) != 255:
-        raise UserError(f"image {path} has grey levels up to {int(found[4])}: 255 (8 bits) is possible")
-    wanted, present = width * height * channels, len(data) - found.end()
+    levels = int(found[4])
+    possible = {255} if bits == 8 else {255, 65535}
+    if levels not in possible:
+        these = " or ".join(f"{most} ({8 if most == 255 else 16} bits)" for most in sorted(possible))
+        raise UserError(f"image {path} has grey levels up to {levels}: {these} is possible")
+    kind = np.dtype(">u2" if levels > 255 else "u1")
+    wanted, present = width * height * channels * kind.itemsize, len(data) - found.end()
     if present != wanted:
         what = "truncated" if present < wanted else "damaged"
         raise UserError(f"image {path} is {what}: {present} bytes of pixels, not {wanted} ({width}x{height})")
-    pixels = np.frombuffer(data, np.uint8, wanted, found.end()).reshape(height, width, channels)
-    return np.ascontiguousarray(np.broadcast_to(pixels, (height, width, 3)))
+    pixels = np.frombuffer(data, kind, wanted // kind.itemsize, found.end()).reshape(height, width, channels)
+    return np.ascontiguousarray(np.broadcast_to(pixels, (height, width, 3)), kind.newbyteorder("="))
 
 
-def _decode_png(path: Path, data: bytes) -> NDArray[np.uint8]:
+def _decode_png(path: Path, data: bytes, bits: int) -> NDArray[Any]:
     import cv2
 
-    _check_png(path, data)
+    _check_png(path, data, bits)
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(0)  # what is wrong is told by our own error
+    depth = cv2.IMREAD_ANYDEPTH if bits > 8 else 0
     try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION | depth)
     except cv2.error:
         image = None
     finally:
@@ -156,7 +222,7 @@ def _decode_png(path: Path, data: bytes) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image[..., ::-1])
 
 
-def _check_png(path: Path, data: bytes) -> None:
+def _check_png(path: Path, data: bytes, most: int) -> None:
     """Walk the chunks to the end, with their checksums, and unpack the pixels.
 
     Raises
@@ -166,8 +232,10 @@ def _check_png(path: Path, data: bytes) -> None:
     """
     width, height = _size(path, data)
     bits, colour, interlaced = data[24], data[25], data[28]
-    if bits > 8 or colour not in _PNG_CHANNELS:
-        raise UserError(f"image {path} has {bits} bits a channel (PNG colour type {colour}): up to 8 are possible")
+    if bits > most or colour not in _PNG_CHANNELS:
+        raise UserError(f"image {path} has {bits} bits a channel (PNG colour type {colour}): up to {most} are possible")
+    if most > 8 and bits < 8 and colour == _PNG_GREY:
+        raise UserError(f"image {path} has {bits} bits a channel: ground truth has 8 or 16")
     at, packed = len(_PNG), []
     while True:
         length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]

@@ -21,6 +21,8 @@ class Contents:
         Path of the reference view.
     truth
         Is there ground truth, hence an error map?
+    estimate
+        Is there a method's answer, or only a scene?
     regions, slices
         Paths of region masks and epipolar slices, in the order in which they are shown.
     volumes
@@ -38,6 +40,7 @@ class Contents:
     views: list[EntityPath] = field(factory=list)
     reference: EntityPath = ()
     truth: bool = False
+    estimate: bool = False
     regions: list[EntityPath] = field(factory=list)
     slices: list[EntityPath] = field(factory=list)
     volumes: list[tuple[EntityPath, int]] = field(factory=list)
@@ -60,6 +63,8 @@ def layout(contents: Contents) -> rrb.Blueprint:
 
 
 def _left(contents: Contents) -> rrb.Container | rrb.View:
+    if not (contents.estimate or contents.truth):
+        return _picture(contents.reference, "Reference view")
     solid: rrb.Container | rrb.View = _space("surface", "Surface", contents.surface_eye)
     if contents.voxels:
         solid = rrb.Vertical(solid, _space("space", "Materiality in disparity space", contents.space_eye))
@@ -79,9 +84,12 @@ def _right(contents: Contents) -> rrb.Container:
     estimate: rrb.Container | rrb.View = _picture(("estimate", "disparity"), "Disparity")
     if contents.maps:
         estimate = rrb.Tabs(estimate, _picture(("passes", "disparity"), "Disparity of the pass"))
-    maps: list[rrb.Container | rrb.View] = [_picture(contents.reference, "Reference view"), estimate]
+    maps: list[rrb.Container | rrb.View] = [_picture(contents.reference, "Reference view")]
     if contents.truth:
-        maps.insert(1, _picture(("truth", "disparity"), "True disparity"))
+        maps.append(_picture(("truth", "disparity"), "True disparity"))
+    if contents.estimate:
+        maps.append(estimate)
+    if contents.estimate and contents.truth:
         maps.append(_picture(("estimate", "error"), "Error, px of the pair"))
     tabs: list[rrb.Container | rrb.View] = []
     if contents.slices:

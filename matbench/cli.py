@@ -3,11 +3,10 @@
 import json
 import os
 import re
-import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 from rich import console as rich_console
@@ -15,18 +14,19 @@ from rich import console as rich_console
 from matbench._version import __version__
 from matbench.errors import UserError
 
-if TYPE_CHECKING:
-    from matbench.comparison import Comparison
-
 
 class Console(rich_console.Console):
-    """A console that leaves a broken pipe to `main`."""
+    """A console that prints what it is told, word for word, and leaves a broken pipe to `main`."""
+
+    def say(self, line: str) -> None:
+        """Print a line that may be of any length and hold anything, such as paths."""
+        self.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError
 
 
-DONE, CELLS_FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
+DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 app = App(
     name="matbench",
@@ -49,6 +49,8 @@ app = App(
 `matbench fetch paper`  download the paper's three scenes
 
 `matbench view runs/1a2b3c4d`  open a recording
+
+`matbench scene check my_scene`  a scene of your own, a folder: is it what it says?
 """,
     help_format="markdown",
     version=__version__,
@@ -122,12 +124,13 @@ def compare(
     `matbench compare -s 'synthetic/*[predict=right]' -m prediction_psnr`
     """
     from matbench import comparison
+    from matbench.commands import running
 
     _check_metric(metric)
     if row is not None and not record:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
-        _say_missing(comparison.default_scenes(data)[1], data)
+        running.say_missing(comparison.default_scenes(data)[1], data)
     ready = comparison.prepare(
         algorithm,
         scene,
@@ -139,7 +142,7 @@ def compare(
         seed=[_whole("seed", one) for one in seed or ("0",)],
         plugin=plugin or (),
     )
-    return _work(ready, metric)
+    return running.work(ready, metric)
 
 
 @app.command(help_epilogue="")
@@ -175,6 +178,7 @@ def ablate(
         Method with several values for its parameters, or a TOML file with `algorithms` and `scenes`.
     """
     from matbench import ablation, comparison
+    from matbench.commands import running
     from matbench.plan import methods
 
     _check_metric(metric)
@@ -193,7 +197,7 @@ def ablate(
         seed=[_whole("seed", one) for one in seed or ("0",)],
         plugin=plugin or (),
     )
-    return _work(ready, metric, is_ablation=any(ablation.factors(chosen).values()))
+    return running.work(ready, metric, is_ablation=any(ablation.factors(chosen).values()))
 
 
 def _whole(name: str, text: str) -> int:
@@ -216,92 +220,6 @@ def _is_of_volumes(metric: str) -> bool:
     from matbench import scoring
 
     return scoring.of_volumes(metric)
-
-
-def _work(ready: "Comparison", metric: str, is_ablation: bool = False) -> int:
-    """Run, print and report a comparison; the exit status."""
-    console = Console()
-    for reason, scenes in ready.left_out.items():
-        console.print(f"without {', '.join(scenes)}: {reason}", markup=False, highlight=False, soft_wrap=True)
-    stopped = _run(ready, console)
-    results, cells = ready.tables()
-    sweeps = ready.sweeps(results)
-    switches = ready.ablation(results) if is_ablation else None
-    report = ready.report(results, cells, switches, sweeps)
-    _print_tables(results, cells, switches, sweeps, metric, console)
-    written = {"scores": ready.folder / "results.csv", "report": report}
-    if sweeps:
-        written["curves"] = ready.folder / "sweeps.csv"
-    if is_ablation:
-        written["ablation"] = ready.folder / "ablation.csv"
-    for what, path in written.items():
-        console.print(f"{what}: {path}", markup=False, highlight=False, soft_wrap=True)
-    if any(ready.folder.glob("cells/*/recording.rrd")):
-        console.print(f"recordings: matbench view {ready.folder}", markup=False, highlight=False, soft_wrap=True)
-    if stopped:
-        console.print("interrupted: the same command goes on from here")
-        return INTERRUPTED
-    return DONE if cells["status"].isin(["ok", "skipped"]).all() else CELLS_FAILED
-
-
-def _say_missing(missing: Sequence[str], data: Path | None) -> None:
-    if missing:
-        from matbench.scenes import DATA_VARIABLE, data_root
-
-        root = data_root(data)
-        why = f"not under {root}" if root else f"give the folder of real scenes by --data or {DATA_VARIABLE}, or"
-        place = f" --data {shlex.quote(str(data))}" if data else ""
-        print(f"without {', '.join(missing)}: {why}{':' if root else ''} bring them with matbench fetch paper{place}")
-
-
-def _run(ready: "Comparison", console: Console) -> bool:
-    """Run a comparison with progress shown; True if it was interrupted."""
-    from rich.markup import escape
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from matbench.run import pending
-
-    todo = len(pending(ready.plan, ready.store, ready.record, ready.row, ready.volumes))
-    total = len(ready.plan.cells)
-    if todo < total:
-        console.print(f"{total - todo} of {total} cells are done already in {ready.folder}", highlight=False)
-    columns = (BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("starting", total=total, completed=total - todo)
-
-        def listen(event: str, cell: Any, outcome: Any) -> None:
-            if event == "start":
-                progress.update(task, description=escape(str(cell)))
-                return
-            progress.advance(task)
-            took = f" {outcome.seconds:.2f} s" if outcome.seconds is not None else ""
-            took += f" {outcome.reason}" if outcome.reason else ""
-            if not console.is_terminal or outcome.reason:
-                line = f"{outcome.status:>7}  {cell}{took}"
-                progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
-
-        try:
-            ready.run(listen)
-        except KeyboardInterrupt:
-            return True
-    return False
-
-
-def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
-    from matbench import scoring
-    from matbench.reports import curves, tables
-    from matbench.reports import switches as effects
-
-    if len(results) and metric not in set(results["metric"]):  # scenes without truth have predictions only
-        metric = results["metric"].iloc[0]
-    higher = next(m.better for m in scoring.metrics() if m.name == metric) == "higher"
-    for table in tables.terminal(results, cells, metric, higher, console.width):
-        console.print(table)
-    for table in curves.terminal(sweeps, metric):
-        console.print(table)
-    if switches is not None:
-        for table in effects.terminal(switches, metric):
-            console.print(table)
 
 
 @app.command(name="list", help_epilogue="")
@@ -349,22 +267,23 @@ def view(
     Parameters
     ----------
     run
-        Run folder that was written with `compare --record`.
+        Run folder that was written with `compare --record`, or a recording, such as of `scene show --record`.
     cell
         Part of the cell's name or key; not needed where there is only one recording.
     """
     from matbench import recording
     from matbench.store import Store
 
-    recording.view(Store(run).recording(cell), web)
+    recording.view(run if run.suffix == ".rrd" else Store(run).recording(cell), web)
     return DONE
 
 
 app.command("matbench.commands.fetch:app", name="fetch", help="Download scenes, check them, and put them in place.")
+app.command("matbench.commands.scene:app", name="scene", help="Look at scenes, check them, and make your own.")
 
 
 def main(tokens: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0 all well, 1 cells failed, 2 wrong usage, 130 interrupted."""
+    """Run the command line and exit: 0 all well, 1 something failed, 2 wrong usage, 130 interrupted."""
     try:
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except UserError as error:

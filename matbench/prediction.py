@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from matbench.errors import unknown
 from matbench.scene import HeldOut, NotInScene, Scene
-from matbench.warping import carry
+from matbench.warping import carry, picture_columns
 
 ENDS = ("left", "right")
 BEST = 100.0
@@ -98,14 +98,12 @@ def predict(view: NDArray[np.uint8], disparity: NDArray[np.float32], steps: floa
 def differences(scene: Scene, disparity: NDArray[np.float32]) -> Differences:
     """(pixels, 3) of the held-out view: predicted less seen, grey levels, NaN where nothing is predicted.
 
-    Wholly black columns at its sides are no picture (rectification left them: 25 in the outermost
-    views of Teddy) and are left out.
+    Its black borders are left out (`picture_columns`; 25 columns in the outermost views of Teddy).
     """
     assert scene.held_out is not None, "only for scenes that withhold a view"  # noqa: S101
     there, image = predict(scene.views[scene.ref], disparity, scene.held_out.steps), scene.held_out.image
-    lit = np.flatnonzero(image.any(axis=(0, 2)))
-    picture = slice(lit[0], lit[-1] + 1) if lit.size else slice(None)
-    return (there - image)[:, picture].reshape(-1, 3)
+    first, last = picture_columns(image)
+    return (there - image)[:, first : last + 1].reshape(-1, 3)
 
 
 def psnr(found: Differences) -> float:

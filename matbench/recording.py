@@ -18,7 +18,8 @@ slices/...                 one epipolar plane as in the paper's figure 2, the fa
                            positive, black zero), on the iteration timeline
 passes/disparity           the map of a pass, on the iteration timeline
 energy/NAME                the energy of every pass, on the iteration timeline
-surface/points             the answer as points in perspective, in the reference view's colours
+surface/points             the answer, or a scene's truth, as points in perspective, in the
+                           reference view's colours
 surface/cameras/LABEL      where the views were taken
 space/materiality          the volume's material points in disparity space, as voxels
 space/frustums/LABEL       what a view sees of the epipolar plane shown in the slices
@@ -64,7 +65,7 @@ YELLOW, THIN = (255, 221, 0), rr.Radius.ui_points(0.75)
 MATERIAL = 0.25  # least materiality of a drawn voxel
 
 
-__all__ = ["RecordingError", "RecordingProbe", "record", "view"]
+__all__ = ["RecordingError", "RecordingProbe", "record", "record_scene", "view"]
 
 
 class RecordingError(Exception):
@@ -106,13 +107,29 @@ def record(
         raise ValueError(f"row {row} is not one of 0..{scene.height - 1}")
     probe = RecordingProbe(row)
     estimate = solve(probe)
+    _keep(path, scene, probe, estimate, title)
+    return estimate
+
+
+def record_scene(path: Path, scene: Scene) -> None:
+    """Write a recording of a scene alone: its views, truth, regions, and its true surface as points.
+
+    Raises
+    ------
+    RecordingError
+        If what was written cannot be read back.
+    """
+    _keep(path, scene, RecordingProbe(scene.height // 2), None, scene.name)
+
+
+def _keep(path: Path, scene: Scene, probe: RecordingProbe, estimate: Estimate | None, title: str) -> None:
+    """Write beside the place, check, and move there."""
     with TemporaryDirectory(dir=path.parent, prefix=".recording-") as folder:
         beside = Path(folder) / path.name
         with _strict():
             written = _write(beside, scene, probe, estimate, title)
         _verify(beside, written)
         beside.replace(path)
-    return estimate
 
 
 @contextmanager
@@ -126,7 +143,7 @@ def _strict() -> Iterator[None]:
         rr.set_strict_mode(before)
 
 
-def _write(path: Path, scene: Scene, probe: RecordingProbe, estimate: Estimate, title: str) -> Counter[str]:
+def _write(path: Path, scene: Scene, probe: RecordingProbe, estimate: Estimate | None, title: str) -> Counter[str]:
     """Write all there is; how many rows were logged for each entity."""
     # an identity of its own, for the viewer keeps one blueprint for each; it takes no other characters
     stream = rr.RecordingStream("matbench-" + re.sub(r"[^A-Za-z0-9]+", "-", title)[:80].strip("-"))
@@ -138,11 +155,14 @@ def _write(path: Path, scene: Scene, probe: RecordingProbe, estimate: Estimate, 
         stream.send_recording_name(title)
         writer = _Writer(stream, scene, probe)
         writer.scene_itself(title)
-        writer.answer(np.asarray(estimate.disparity[scene.ref], np.float32))
-        writer.passes(estimate)
-        if estimate.volume is not None:
-            writer.material(estimate.volume)
-        writer.told_volumes()
+        if estimate is not None:
+            writer.answer(np.asarray(estimate.disparity[scene.ref], np.float32))
+            writer.passes(estimate)
+            if estimate.volume is not None:
+                writer.material(estimate.volume)
+            writer.told_volumes()
+        elif scene.ref in scene.truth:
+            writer.surface(scene.truth[scene.ref])
         stream.send_blueprint(blueprint.layout(writer.contents))
     finally:
         stream.disconnect()  # which also flushes
@@ -219,11 +239,17 @@ class _Writer:
     def answer(self, disparity: NDArray[np.float32]) -> None:
         """The map, its error and the surface."""
         scene, contents = self.scene, self.contents
+        contents.estimate = True
         small = drawing.thinned(disparity, PICTURE_PIXELS)
         self.picture("estimate", "disparity", picture=coloring.disparity_colors(small, self.ends))
         if contents.truth:
             truth = drawing.thinned(scene.truth[scene.ref], PICTURE_PIXELS)
             self.picture("estimate", "error", picture=coloring.error_colors(small, truth, scene.pair_steps))
+        self.surface(disparity)
+
+    def surface(self, disparity: NDArray[np.float32]) -> None:
+        """A map as points in perspective, and where the views were taken."""
+        scene, contents = self.scene, self.contents
         perspective = Perspective.of(scene)
         points, colors, radii = perspective.surface(disparity, POINTS)
         self.log("surface", what=rr.ViewCoordinates.RDF)

@@ -5,6 +5,7 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
+from glob import glob
 from pathlib import Path
 
 from attrs import evolve, frozen
@@ -30,6 +31,10 @@ def user_root() -> Path:
     return platformdirs.user_data_path("matbench", appauthor=False)
 
 
+OWN = "folder"
+"""The dataset that loads a scene from the folder of a path; every name that is a path is its."""
+
+
 def data_root(data: str | Path | None = None) -> Path | None:
     """The folder of real scenes: `data`, else what MATBENCH_DATA names, else `user_root` if it exists.
 
@@ -47,6 +52,27 @@ def data_root(data: str | Path | None = None) -> Path | None:
         by = "--data" if data else DATA_VARIABLE
         raise UserError(f"data folder {str(root)!r} ({by}) does not exist: name the folder that holds middlebury/")
     return root.resolve()
+
+
+def own_folder(name: str) -> str | None:
+    """The folder that a scene's name means, as it is always written; None if it names no folder.
+
+    A path begins with ``/``, ``.`` or ``~``, or is one that exists and no DATASET/SCENE; written as
+    ``folder/PATH`` it is a path in any case. A relative path is written as ``./PATH`` or ``../PATH``.
+    """
+    prefix, _, rest = name.partition("/")
+    if prefix == OWN and rest:
+        name = rest
+    elif not name.startswith(("/", ".", "~")) and (prefix in plugins.installed("datasets") or not os.path.isdir(name)):  # noqa: PTH112
+        return None
+    path = os.path.normpath(os.path.expanduser(name))  # noqa: PTH111 (as text: what is typed stays recognizable)
+    return path if path.startswith((os.sep, "..")) else os.path.join(".", path)  # noqa: PTH118
+
+
+def _folders(pattern: str) -> list[str]:
+    """The folders that a pattern of paths matches."""
+    found = glob(own_folder(pattern) or pattern)  # noqa: PTH207
+    return [path for path in sorted(found) if os.path.isdir(path)]  # noqa: PTH112
 
 
 def _dataset(prefix: str) -> Dataset:
@@ -111,6 +137,9 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Se
             continue
         known = known if known is not None else listings(data)
         hits = group(spec.name, known)
+        if not hits and (folders := _folders(spec.name)):
+            names |= {str(Spec(folder, spec.options)): None for folder in folders}
+            continue
         offered = {name: found for name in hits if isinstance(found := known[name], Listing)}
         present = {name: found for name, found in offered.items() if found.present or found.complete}
         why = {name: _unfit(found, spec.options) for name, found in present.items()}
@@ -147,9 +176,11 @@ def _no_match(spec: Spec, hits: Sequence[str], unfit: Mapping[str, str]) -> User
             return UserError(f"{which}: see 'matbench list'")
     else:
         which += " are known but not under the data folder"
-    size = {key: value for key, value in spec.options.items() if key == "size"}
-    fetch = shlex.join(["matbench", "fetch", str(Spec(spec.name, size))])
-    return UserError(f"{which}: give the data folder by --data or {DATA_VARIABLE}, or bring them with {fetch}")
+    advice = f"give the data folder by --data or {DATA_VARIABLE}"
+    if any(hasattr(_dataset(hit.partition("/")[0]), "downloads") for hit in hits):
+        size = {key: value for key, value in spec.options.items() if key == "size"}
+        advice += f", or bring them with {shlex.join(['matbench', 'fetch', str(Spec(spec.name, size))])}"
+    return UserError(f"{which}: {advice}")
 
 
 def load_scene(name: str, data: str | Path | None = None) -> Scene:
@@ -158,8 +189,8 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     Parameters
     ----------
     name
-        ``dataset/scene``, options in brackets; one value for each. Besides its dataset's own, every
-        scene has ``predict=left`` and ``predict=right``: that end view is held out.
+        ``dataset/scene`` or the path of a folder, options in brackets; one value for each. Besides its
+        dataset's own, every scene has ``predict=left`` and ``predict=right``: that end view is held out.
     data
         The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
 
@@ -171,16 +202,24 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
     specs = parse(name)
     if len(specs) != 1:
         raise UserError(f"{name!r} names {len(specs)} scenes: give one value for each option")
-    prefix, slash, rest = specs[0].name.partition("/")
-    if not slash or not rest:
-        raise UserError(f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box'")
     options = dict(specs[0].options)
     end = options.pop("predict", None)
-    scene = _dataset(prefix).load(rest, options, data_root(data))
+    scene = _load(specs[0].name, options, data)
     if end is None:
         return scene
     from matbench.prediction import hold_out
 
     full = parse(scene.name)[0]
-    name = label(full.name, dict(sorted({**full.options, "predict": end}.items())))
-    return evolve(hold_out(scene, end), name=name)
+    return evolve(hold_out(scene, end), name=label(full.name, dict(sorted({**full.options, "predict": end}.items()))))
+
+
+def _load(name: str, options: Mapping[str, str], data: str | Path | None) -> Scene:
+    """From the dataset that the name without its options says."""
+    if (folder := own_folder(name)) is not None:
+        return _dataset(OWN).load(folder, options, None)
+    prefix, slash, rest = name.partition("/")
+    if not slash or not rest:
+        raise UserError(
+            f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box', or a path, ./{name}"
+        )
+    return _dataset(prefix).load(rest, options, data_root(data))

@@ -57,8 +57,8 @@ def parse(selector: str) -> list[Spec]:
     """
     specs = []
     for part in re.split(r",(?![^\[]*\])", selector):
-        found = re.fullmatch(r"\s*([^\[\]\s]+)\s*(?:\[([^\[\]]*)\])?\s*", part)
-        if not found:
+        found = re.fullmatch(r"\s*([^\[\]\s]+(?: +[^\[\]\s]+)*)\s*(?:\[([^\[\]]*)\])?\s*", part)
+        if not found or (" " in found.group(1) and "/" not in found.group(1)):  # only paths may hold blanks
             raise UserError(
                 f"cannot read {part!r}: write NAME or NAME[key=value key=value], such as 'sgbm[fill=false]'"
             )

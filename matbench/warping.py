@@ -1,4 +1,4 @@
-"""Carrying a disparity map into another view, with a z-buffer."""
+"""Between two views by disparities: a map carried into another view, and another view's colours brought back."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,3 +58,41 @@ def carry(disparity: NDArray[np.float32], steps: float) -> NDArray[np.float64]:
         put(rows[on], column[on], low[on] + share * rise[on])
     nearest[np.isinf(nearest)] = np.nan
     return nearest
+
+
+def picture_columns(image: NDArray[np.uint8]) -> tuple[int, int]:
+    """The first and the last column that is not black from top to bottom: rectified views may end before their frame.
+
+    Of an image that is all black, all of it.
+    """
+    lit = np.flatnonzero(image.any(axis=(0, 2)))
+    return (int(lit[0]), int(lit[-1])) if len(lit) else (0, image.shape[1] - 1)
+
+
+def warped(image: NDArray[np.uint8], disparity: NDArray[np.float32], steps: int) -> NDArray[np.float32]:
+    """What the reference view would look like, made from the colours of a view `steps` to the right of it.
+
+    Parameters
+    ----------
+    image
+        (H, W, 3) of that view.
+    disparity
+        (H, W) of the reference view, pixels per view step.
+
+    Returns
+    -------
+    (H, W, 3) float32, cubic between pixels; NaN where the disparity is NaN or leads out of the
+    frame, or into its black border (`picture_columns`).
+    """
+    import cv2
+
+    height, width = disparity.shape
+    columns = np.arange(width, dtype=np.float32) - np.float32(steps) * disparity
+    rows = np.broadcast_to(np.arange(height, dtype=np.float32)[:, None], (height, width))
+    first, last = picture_columns(image)
+    inside = (columns >= first) & (columns <= last)  # False for NaN
+    columns = np.where(inside, columns, np.float32(0))
+    border = cv2.BORDER_REPLICATE
+    found = cv2.remap(image.astype(np.float32), columns, rows, cv2.INTER_CUBIC, borderMode=border)
+    found[~inside] = np.nan
+    return np.asarray(found, np.float32)

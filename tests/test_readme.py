@@ -8,22 +8,44 @@ import sys
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rerun as rr
+from scene_files import Layers, write_png
 
 from matbench import load_scene
+from matbench.spec import Spec, parse
 
 README = Path(__file__).parent.parent / "README.md"
 if not README.exists():
     pytest.skip("no README beside the tests", allow_module_level=True)
 TEXT = README.read_text()
 CODE = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+TOML = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)[0]
 LINES = re.findall(r"^    (matbench .*)$", TEXT, re.MULTILINE)
 
 
 def matbench(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     tokens = [sys.executable, "-m", *shlex.split(line)]
     return subprocess.run(tokens, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+def own_scene(folder: Path) -> None:
+    """The folder that the README's scene.toml describes."""
+    folder.mkdir()
+    world = Layers(near=6, far=2)
+    for view, name in enumerate(("left", "middle", "right")):
+        write_png(folder / f"{name}.png", world.view(view - 1))
+    write_png(folder / "middle_disparity.png", (world.truth() * 16).astype(np.uint8))
+    (folder / "scene.toml").write_text(TOML)
+
+
+def test_the_scene_of_your_own_is_what_it_says(tmp_path: Path) -> None:
+    own_scene(tmp_path / "my_scene")
+    for line in (line for line in LINES if line.startswith("matbench scene") and " new " not in line):
+        done = matbench(line, tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "scene-my_scene.png").exists()
 
 
 def test_the_method_of_ten_lines_competes(tmp_path: Path) -> None:
@@ -91,8 +113,14 @@ def test_the_papers_setting_is_one_line(data_root: Path, tmp_path: Path) -> None
     assert shape[1] == 22
 
 
+def small(selector: str) -> list[str]:
+    """The same scenes, computed in small pictures."""
+    size = {"size": "64x48"}
+    return [str(Spec(s.name, s.options | size)) if s.name.startswith("synthetic/") else str(s) for s in parse(selector)]
+
+
 @pytest.mark.parametrize("line", [line for line in LINES if "--data" not in line and "mine.py" not in line])
-def test_the_other_lines_name_what_exists(line: str, tmp_path: Path) -> None:
+def test_the_other_lines_name_what_exists(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from matbench import comparison, downloads
 
     tokens = shlex.split(line)
@@ -100,9 +128,11 @@ def test_the_other_lines_name_what_exists(line: str, tmp_path: Path) -> None:
         assert downloads.downloads(tokens[2:])[0]
         return
     if tokens[1] != "compare":
-        assert tokens[1] in ("list", "view")
+        assert tokens[1] in ("list", "scene", "view")
         return
     after = list(pairwise(tokens))
+    monkeypatch.chdir(tmp_path)
+    own_scene(tmp_path / "my_scene")
     chosen = [value for flag, value in after if flag == "-a"] or None
-    scenes = [value for flag, value in after if flag == "-s"] or None
+    scenes = [quick for flag, value in after if flag == "-s" for quick in small(value)] or None
     assert comparison.prepare(chosen, scenes, out=tmp_path / "run").plan.cells

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun as rr
+from attrs import evolve
 
 from matbench import coloring, drawing, recording
 from matbench.algorithm import Context, Estimate, Probe
 from matbench.errors import UserError
-from matbench.recording import RecordingError, RecordingProbe, record, view
+from matbench.recording import RecordingError, RecordingProbe, record, record_scene, view
 from matbench.regions import VIEW_REGIONS
 from matbench.scene import Range, Scene
 from matbench.space import DisparitySpace, Volume, visibility
@@ -127,6 +128,23 @@ def test_every_stream_is_there(rows: dict[str, list[Row]]) -> None:
     assert all(len(rows[e]) == 1 and rows[e][0][0] is None for e in rows if e in once)
     assert all([step for step, _ in rows[e]] == list(range(PASSES)) for e in every)
     assert [step for step, _ in rows["/energy/late"]] == [0, 1]
+
+
+@pytest.mark.parametrize("has_truth", [True, False])
+def test_a_scene_alone_is_its_views_truth_and_regions(tmp_path: Path, has_truth: bool) -> None:
+    scene = make_scene() if has_truth else evolve(make_scene(), truth={}, regions={})
+    record_scene(tmp_path / "scene.rrd", scene)
+    rows = read(tmp_path / "scene.rrd")
+    names = {entity for entity in rows if not entity.startswith(("/__", "/surface/cameras"))}
+    expected = {"/about", *(f"/views/{label}" for label in scene.labels), f"/views/{scene.labels[scene.ref]}/row"}
+    if has_truth:
+        expected |= {"/truth/disparity", "/regions", *(f"/regions/{name}" for name in scene.scored_regions)}
+        expected |= {"/surface", "/surface/points"}
+        points = rows["/surface/points"][0][1]["Points3D:positions"]
+        assert len(rows["/surface/points"]) == 1
+        assert points is not None
+    assert names == expected
+    assert list(tmp_path.iterdir()) == [tmp_path / "scene.rrd"]
 
 
 def test_one_recording_with_its_blueprint(path: Path) -> None:

@@ -1,1 +1,1 @@
-"""Commands of their own modules, imported when they are typed."""
+"""Commands in modules of their own, imported when they are typed."""

@@ -5,12 +5,10 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn
 
-from matbench import cli
-from matbench.cli import DONE, INTERRUPTED
+from matbench.cli import DONE, FAILED, INTERRUPTED, Console
 from matbench.dataset import Download
 from matbench.downloads import downloads, fetch_root
 from matbench.errors import UserError
@@ -39,7 +37,6 @@ they are free for research, and ask for citation.
     help_format="markdown",
 )
 
-FAILED = 1
 _SHOWN = 4  # reasons of one scene
 
 
@@ -68,7 +65,7 @@ def fetch(
     scene
         Scenes or patterns, as for `compare -s`, a size in brackets; `paper` is the paper's three.
     """
-    console = cli.Console()
+    console = Console()
     chosen, left_out = downloads(scene)
     root, site = fetch_root(data), None if mirror is None else site_of(mirror)
     if not 0 < timeout <= 3600:
@@ -76,15 +73,11 @@ def fetch(
     if not 0 <= retries <= 100:
         raise UserError(f"retries {retries} is not a whole number from 0 to 100")
     for one in left_out:
-        _say(console, f"without {one}")
+        console.say(f"without {one}")
     if dry_run:
         _plan(console, list(look(chosen, root)), site)
         return DONE
     return _fetch(console, chosen, root, site, Patience(timeout, retries, PATIENCE.pause))
-
-
-def _say(console: Console, line: str) -> None:
-    console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def _count(count: int, what: str) -> str:
@@ -107,14 +100,14 @@ def _plan(console: Console, looked: Sequence[Result], site: str | None) -> None:
         size = sum(file.bytes for file in one.files if file.name in missing)
         total += size
         if not missing:
-            _say(console, f"{one.name}: all {_files(len(one.files))} there, under {result.folder}")
+            console.say(f"{one.name}: all {_files(len(one.files))} there, under {result.folder}")
             continue
-        _say(console, f"{one.name}: {len(missing)} of {_files(len(one.files))}, {_megabytes(size)}, to {result.folder}")
+        console.say(f"{one.name}: {len(missing)} of {_files(len(one.files))}, {_megabytes(size)}, to {result.folder}")
         for reason in result.reasons:
-            _say(console, f"  {reason}")
+            console.say(f"  {reason}")
         for at, source in enumerate(one.sources):
-            _say(console, f"  {'from' if at == 0 else 'else'} {site or one.site}{source}")
-    _say(console, f"in all {_megabytes(total)} of pictures; an archive's size is known when it comes")
+            console.say(f"  {'from' if at == 0 else 'else'} {site or one.site}{source}")
+    console.say(f"in all {_megabytes(total)} of pictures; an archive's size is known when it comes")
 
 
 def _fetch(console: Console, chosen: Sequence[Download], root: Path, site: str | None, patience: Patience) -> int:
@@ -131,7 +124,7 @@ def _fetch(console: Console, chosen: Sequence[Download], root: Path, site: str |
                 file = escape(what.rpartition("/")[2])
                 progress.update(task, description=f"{place} {file}", completed=done, total=total)
             elif event == "waiting":
-                _say(progress.console, f"waiting: {what} is being fetched by another matbench")
+                console.say(f"waiting: {what} is being fetched by another matbench")
 
         place = f"1/{len(chosen)}"
         interrupted = False
@@ -139,12 +132,12 @@ def _fetch(console: Console, chosen: Sequence[Download], root: Path, site: str |
             for result in bring(chosen, root, mirror=site, patience=patience, listen=listen):
                 results.append(result)
                 place = f"{len(results) + 1}/{len(chosen)}"
-                _say(progress.console, _outcome(result))
+                console.say(_outcome(result))
         except KeyboardInterrupt:
             interrupted = True
     _account(console, results, root)
     if interrupted:
-        _say(console, "interrupted: the same command goes on from here")
+        console.say("interrupted: the same command goes on from here")
         return INTERRUPTED
     return FAILED if any(result.missing for result in results) else DONE
 
@@ -164,19 +157,17 @@ def _account(console: Console, results: Sequence[Result], root: Path) -> None:
     """What came, what was there, what failed, why, and what to do about it."""
     failed = [result for result in results if result.missing]
     for result in failed:
-        _say(console, f"\n{result.download.name}: {', '.join(result.missing)} missing")
+        console.say(f"\n{result.download.name}: {', '.join(result.missing)} missing")
         for reason in result.reasons[:_SHOWN]:
-            _say(console, f"  {reason}")
+            console.say(f"  {reason}")
         if len(result.reasons) > _SHOWN:
-            _say(console, f"  and so on, for {len(result.reasons) - _SHOWN} more")
+            console.say(f"  and so on, for {len(result.reasons) - _SHOWN} more")
         for at, url in enumerate(result.urls):
-            _say(console, f"  {'or' if at else 'by hand'} from {url}")
-        _say(console, f"  to {result.folder}/")
+            console.say(f"  {'or' if at else 'by hand'} from {url}")
+        console.say(f"  to {result.folder}/")
     if failed:
-        _say(console, "\nthe same command tries again, and checks what was placed by hand")
+        console.say("\nthe same command tries again, and checks what was placed by hand")
     came = sum(bool(result.came) and not result.missing for result in results)
     there = len(results) - came - len(failed)
     amount = _megabytes(sum(result.bytes for result in results))
-    _say(
-        console, f"{_count(came, 'scene')} came ({amount}), {there} there already, {len(failed)} failed; folder: {root}"
-    )
+    console.say(f"{_count(came, 'scene')} came ({amount}), {there} there already, {len(failed)} failed; folder: {root}")

@@ -1,14 +1,18 @@
 """Image files: read exactly, or refused in one line that names the file."""
 
 import struct
+import tracemalloc
 import zlib
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scene_files import check_one_line
 
-from matbench.datasets.images import read_grey, read_rgb, read_size
+from matbench.datasets.images import encoding, read_grey, read_levels, read_rgb, read_size
 from matbench.errors import UserError
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (7, 11, 3), np.uint8)
@@ -121,3 +125,111 @@ def test_png_and_ppm_of_a_real_view_agree(data_root: Path) -> None:
     np.testing.assert_array_equal(one, read_rgb(middlebury / "eval_v2/teddy/imL.png"))
     two = read_rgb(middlebury / "scenes2001/data/venus/im2.ppm")
     np.testing.assert_array_equal(two, read_rgb(middlebury / "eval_v2/venus/imL.png"))
+
+
+DEEP = np.random.default_rng(1).integers(0, 65536, (7, 11), np.uint16)
+
+
+def test_sixteen_bits_come_back_as_levels_only(tmp_path: Path) -> None:
+    path = tmp_path / "truth"
+    for content in (_png(DEEP), b"P5\n11 7\n65535\n" + DEEP.astype(">u2").tobytes()):
+        path.write_bytes(content)
+        np.testing.assert_array_equal(read_levels(path, (11, 7)), DEEP)
+        assert encoding(path) == "grey16"
+        with pytest.raises(UserError, match=r"16 bits|65535"):
+            read_rgb(path)
+    path.write_bytes(_png(PICTURE[..., 0]))
+    np.testing.assert_array_equal(read_levels(path), PICTURE[..., 0])
+    assert encoding(path) == "grey8"
+    path.write_bytes(_png(PICTURE.astype(np.uint16) * 256))
+    with pytest.raises(UserError, match="is coloured"):
+        read_levels(path)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"P5\n2 2\n1000\n12345678", "1000"),
+        (b"P5\n2 2\n65535\n1234567", "truncated"),
+        (b"P5\n2 2\n65535\n123456789", "damaged"),
+        (_forged_png(8, 4, b"\0" * 8, bits=1), "1 bits"),
+        (_forged_png(4, 4, b"\0" * 35, bits=16), "4x4"),
+    ],
+)
+def test_levels_that_mean_something_else_are_refused(tmp_path: Path, data: bytes, words: str) -> None:
+    path = tmp_path / "truth"
+    path.write_bytes(data)
+    with pytest.raises(UserError, match=words):
+        read_levels(path)
+
+
+@pytest.mark.parametrize(
+    "data", [_forged_png(8000, 8000, b"\0" * 999), b"P6\n8000 8000\n255\n" + bytes(999), b"P5\n8000 8000\n255\n1"]
+)
+def test_a_claim_is_not_allocated(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "image"
+    path.write_bytes(data)
+    tracemalloc.start()
+    _refused(path, "8000x8000")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1_000_000, "64 MB and more are claimed"
+
+
+FUZZED = {
+    "png": _png(PICTURE),
+    "png16": _png(DEEP),
+    "ppm": _pnm(PICTURE),
+    "pgm": _pnm(PICTURE[..., 0]),
+    "pgm16": b"P5 11 7 65535\n" + DEEP.astype(">u2").tobytes(),
+}
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=300)
+@given(
+    st.sampled_from(sorted(FUZZED)),
+    st.lists(st.tuples(st.integers(0, 400), st.binary(max_size=4)), max_size=3),
+    st.integers(0, 400),
+)
+def test_a_damaged_file_is_whole_or_refused(
+    tmp_path: Path, capfd, kind: str, patches: list[tuple[int, bytes]], cut: int
+) -> None:
+    data = bytearray(FUZZED[kind])
+    for at, patch in patches:
+        data[at % len(data) : at % len(data) + len(patch)] = patch
+    path = tmp_path / "image"
+    path.write_bytes(bytes(data[: max(0, len(data) - max(0, cut - 200))]))
+    for read, kinds in ((read_rgb, [np.uint8]), (read_levels, [np.uint16])):
+        try:
+            image = read(path, (11, 7))
+        except UserError as error:
+            check_one_line(error)
+        else:
+            assert image.shape[:2] == (7, 11)
+            assert image.dtype in kinds
+    assert capfd.readouterr().err == ""
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([1, 2, 4, 8, 16, 3]),
+    st.integers(0, 7),
+    st.binary(max_size=200),
+)
+def test_any_png_header_is_told_or_refused(
+    tmp_path: Path, width: int, height: int, bits: int, colour: int, pixels: bytes
+) -> None:
+    header = struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)
+    chunks = _chunk(b"IHDR", header) + _chunk(b"IDAT", zlib.compress(pixels)) + _chunk(b"IEND", b"")
+    path = tmp_path / "image.png"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunks)
+    for read in (read_rgb, read_levels):
+        try:
+            image = read(path)
+        except UserError as error:
+            check_one_line(error)
+        else:
+            assert image.shape[:2] == (height, width)
+            assert width * height <= 8 * len(pixels)

@@ -1,0 +1,199 @@
+"""Scenes kept as files: which images are its views, and what its truth files mean."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from matbench import spec
+from matbench.datasets.choose import search_range, views_and_reference
+from matbench.datasets.images import encoding, read_levels, read_rgb, read_size
+from matbench.datasets.pfm import read_disparities
+from matbench.errors import UserError, unknown
+from matbench.regions import regions
+from matbench.scene import Range, Scene
+
+OPTIONS = ("baseline", "disparities", "ref", "views")
+
+
+def inside(folder: Path, name: str) -> Path:
+    """The file of that name in a folder or below it; neither the name nor a link may lead out.
+
+    Raises
+    ------
+    UserError
+        If it does, or no file can have that name.
+    """
+    try:
+        file = folder / name
+        is_inside = file.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # too long, links in a circle, a null character
+        raise UserError(f"{name!r} is no file name") from None
+    if not is_inside:
+        raise UserError(f"{name!r} leads out of the folder {folder}: images and truth must lie in it")
+    return file
+
+
+@frozen
+class TruthFile:
+    """A file of true disparities: PFM, or a grey PNG or PGM of 8 or 16 bits.
+
+    Parameters
+    ----------
+    scale
+        The stored number that one pixel per view step has.
+    unknown
+        The stored number that means unknown, besides what is not finite; None if there is none.
+    """
+
+    path: Path
+    scale: float = 1.0
+    unknown: float | None = None
+
+    def read(self, size: tuple[int, int]) -> NDArray[np.float32]:
+        """(H, W) float32, pixels per view step, NaN where unknown.
+
+        Raises
+        ------
+        UserError
+            If it cannot be read, is unknown everywhere, or leads out of the views.
+        """
+        if encoding(self.path) == "pfm":
+            stored = read_disparities(self.path, size)
+        else:
+            stored = read_levels(self.path, size).astype(np.float32)
+        truth = stored / np.float32(self.scale)
+        if self.unknown is not None:
+            truth[stored == np.float32(self.unknown)] = np.nan
+        if np.isnan(truth).all():
+            raise UserError(f"ground truth {self.path} is unknown everywhere")
+        farthest = float(np.nanmax(np.abs(truth)))
+        if farthest >= size[0]:
+            raise UserError(
+                f"ground truth {self.path} has {farthest:g} px per view step, more than the {size[0]} px of a row: "
+                f"its scale, {self.scale:g}, is not right"
+            )
+        return truth
+
+
+@frozen
+class StoredScene:
+    """Where the views of a scene lie and what is known about them.
+
+    Parameters
+    ----------
+    called
+        Its name, without options.
+    views, labels
+        Files from left to right, and what each is called; labels end in numbers that increase.
+    disparities
+        The range to search, pixels per view step.
+    truth
+        View index -> its file.
+    pair_steps
+        View steps between the two views of the pair.
+    size
+        (width, height), where that is known beforehand.
+    reference
+        Index of the view that is scored if nothing else is asked for.
+    column
+        The views were taken one below the other: all is turned by a quarter, counter-clockwise,
+        so that they lie from left to right.
+    """
+
+    called: str
+    views: tuple[Path, ...]
+    labels: tuple[str, ...]
+    disparities: Range
+    truth: Mapping[int, TruthFile] = field(factory=dict)
+    pair_steps: int = 1
+    size: tuple[int, int] | None = None
+    reference: int | None = None
+    column: bool = False
+
+    def load(self, options: Mapping[str, str], own: tuple[str, ...] = ()) -> Scene:
+        """Read the scene.
+
+        Parameters
+        ----------
+        options
+            `OPTIONS`, and those of the dataset.
+        own
+            Names of the latter, already heeded.
+
+        Raises
+        ------
+        UserError
+            For an unknown option or value, and for missing or damaged files.
+        """
+        for option in options:
+            if option not in (*OPTIONS, *own):
+                raise unknown(f"option of {self.called}", option, (*OPTIONS, *own))
+        chosen, ref = views_and_reference(self.called, self.labels, self._preferred(), options)
+        searched = search_range(self.called, options.get("disparities"), self.pair_steps)
+        partner = self._partner(ref)
+
+        images = {ref: read_rgb(self.views[ref], self.size)}
+        height, width = images[ref].shape[:2]
+        images |= {index: read_rgb(self.views[index], (width, height)) for index in chosen if index != ref}
+        truth = {view: file.read((width, height)) for view, file in self.truth.items() if view in images}
+        if self.column:
+            # column y of what is turned is row y of the picture: where nearer points move up from one
+            # view to the next below it, they then move left
+            images = {index: np.rot90(image) for index, image in images.items()}
+            truth = {index: np.rot90(values) for index, values in truth.items()}
+
+        views = np.zeros((len(self.views), *images[ref].shape), np.uint8)  # those not chosen are dropped below
+        for index, image in images.items():
+            views[index] = image
+        full = Scene(
+            name=spec.label(self.called, dict(sorted(options.items()))),
+            views=views,
+            labels=self.labels,
+            ref=ref,
+            disparities=searched or self.disparities,
+            truth=truth,
+            pair_steps=self.pair_steps,
+            regions=regions(images[ref], truth[ref], partner) if ref in truth else {},
+        )
+        return full if len(chosen) == len(self.labels) else full.choose(chosen)
+
+    def _preferred(self) -> list[int]:
+        """Views that may be scored, the best first: those with truth, from the middle; without any, all."""
+        middle = (len(self.views) - 1) / 2
+        able = sorted(self.truth or range(len(self.views)), key=lambda view: (abs(view - middle), view))
+        return able if self.reference is None else [self.reference, *(v for v in able if v != self.reference)]
+
+    def _partner(self, ref: int) -> int:
+        """View steps from the reference view to the other one of the pair."""
+        for steps in (self.pair_steps, -self.pair_steps):
+            if 0 <= ref + steps < len(self.views):
+                return steps
+        raise UserError(
+            f"{self.called}: no view lies {self.pair_steps} steps (pair_steps) from its reference view "
+            f"{self.labels[ref]}: the others are at most {max(ref, len(self.views) - 1 - ref)} steps away"
+        )
+
+    def problems(self) -> list[str]:
+        """Everything that is wrong with the files, one line each; the size that most views have is right."""
+        found, sizes = [], {}
+        for path in self.views:
+            try:
+                sizes[path] = read_size(path)
+            except UserError as error:
+                found.append(str(error))
+        if not sizes:
+            return found
+        size = self.size or Counter(sizes.values()).most_common(1)[0][0]
+        files: list[Callable[[], object]] = [partial(read_rgb, path, size) for path in sizes]
+        files += [partial(file.read, size) for file in self.truth.values()]
+        for read in files:
+            try:
+                read()
+            except UserError as error:
+                found.append(str(error))
+        return found

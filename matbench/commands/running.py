@@ -1,0 +1,92 @@
+"""What `compare` and `ablate` share: a comparison run with progress shown, its tables printed, its report written."""
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from matbench import scoring
+from matbench.cli import DONE, FAILED, INTERRUPTED, Console
+from matbench.comparison import Comparison
+from matbench.reports import curves, tables
+from matbench.reports import switches as effects
+from matbench.run import pending
+from matbench.scenes import DATA_VARIABLE, data_root
+
+
+def work(ready: Comparison, metric: str, is_ablation: bool = False) -> int:
+    """Run, print and report a comparison; the exit status."""
+    console = Console()
+    for reason, scenes in ready.left_out.items():
+        console.say(f"without {', '.join(scenes)}: {reason}")
+    stopped = _run(ready, console)
+    results, cells = ready.tables()
+    sweeps = ready.sweeps(results)
+    switches = ready.ablation(results) if is_ablation else None
+    report = ready.report(results, cells, switches, sweeps)
+    _print_tables(results, cells, switches, sweeps, metric, console)
+    written = {"scores": ready.folder / "results.csv", "report": report}
+    if sweeps:
+        written["curves"] = ready.folder / "sweeps.csv"
+    if is_ablation:
+        written["ablation"] = ready.folder / "ablation.csv"
+    for what, path in written.items():
+        console.say(f"{what}: {path}")
+    if any(ready.folder.glob("cells/*/recording.rrd")):
+        console.say(f"recordings: matbench view {ready.folder}")
+    if stopped:
+        console.say("interrupted: the same command goes on from here")
+        return INTERRUPTED
+    return DONE if cells["status"].isin(["ok", "skipped"]).all() else FAILED
+
+
+def say_missing(missing: Sequence[str], data: Path | None) -> None:
+    if missing:
+        root = data_root(data)
+        why = f"not under {root}" if root else f"give the folder of real scenes by --data or {DATA_VARIABLE}, or"
+        place = f" --data {shlex.quote(str(data))}" if data else ""
+        print(f"without {', '.join(missing)}: {why}{':' if root else ''} bring them with matbench fetch paper{place}")
+
+
+def _run(ready: Comparison, console: Console) -> bool:
+    """Run a comparison with progress shown; True if it was interrupted."""
+    todo = len(pending(ready.plan, ready.store, ready.record, ready.row, ready.volumes))
+    total = len(ready.plan.cells)
+    if todo < total:
+        console.say(f"{total - todo} of {total} cells are done already in {ready.folder}")
+    columns = (BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("starting", total=total, completed=total - todo)
+
+        def listen(event: str, cell: Any, outcome: Any) -> None:
+            if event == "start":
+                progress.update(task, description=escape(str(cell)))
+                return
+            progress.advance(task)
+            took = f" {outcome.seconds:.2f} s" if outcome.seconds is not None else ""
+            took += f" {outcome.reason}" if outcome.reason else ""
+            if not console.is_terminal or outcome.reason:
+                line = f"{outcome.status:>7}  {cell}{took}"
+                console.say(line)
+
+        try:
+            ready.run(listen)
+        except KeyboardInterrupt:
+            return True
+    return False
+
+
+def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
+    if len(results) and metric not in set(results["metric"]):  # scenes without truth have predictions only
+        metric = results["metric"].iloc[0]
+    higher = next(m.better for m in scoring.metrics() if m.name == metric) == "higher"
+    for table in tables.terminal(results, cells, metric, higher, console.width):
+        console.print(table)
+    for table in curves.terminal(sweeps, metric):
+        console.print(table)
+    if switches is not None:
+        for table in effects.terminal(switches, metric):
+            console.print(table)

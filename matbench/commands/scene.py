@@ -1,0 +1,191 @@
+"""`matbench scene`: look at scenes, check them, make one's own."""
+
+import os
+import re
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from matbench.cli import DONE, FAILED, Console, Data
+from matbench.errors import UserError
+
+app = App(
+    name="scene",
+    help="Look at scenes, check them, and make your own.",
+    help_epilogue="""\
+**Examples**
+
+`matbench scene show synthetic/curved`  a contact sheet: views, truth, regions
+
+`matbench scene new my_scene`  write the scene.toml of a folder of images
+
+`matbench scene check my_scene`  is it what it says?
+""",
+    help_format="markdown",
+)
+
+
+@app.command(help_epilogue="")
+def show(
+    *names: str,
+    out: Annotated[
+        Path | None, Parameter(name=["--out", "-o"], help="The PNG file; default scene-NAME.png in this folder.")
+    ] = None,
+    record: Annotated[bool, Parameter(negative="", help="Also write a recording beside it, for `view`.")] = False,
+    data: Data = None,
+) -> int:
+    """Draw a contact sheet of a scene: its views, one row in all of them, its truth, its regions.
+
+    **Examples**
+
+    `matbench scene show synthetic/curved`
+
+    `matbench scene show 'middlebury2003/teddy[size=half]' -o teddy.png --data DATA`
+
+    `matbench scene show my_scene --record`
+
+    Parameters
+    ----------
+    names
+        Scenes or patterns, as for `compare`; the path of a folder is a scene of your own.
+    """
+    from matbench.reports.contact_sheet import contact_sheet
+    from matbench.scenes import load_scene, select
+    from matbench.store import write_bytes
+
+    if not names:
+        raise UserError("no scene: name one, such as 'matbench scene show synthetic/curved'")
+    chosen = select(names, data)
+    console = Console()
+    for reason, scenes in chosen.left_out.items():
+        console.say(f"without {', '.join(scenes)}: {reason}")
+    if out is not None and len(chosen.names) > 1:
+        raise UserError(
+            f"--out {str(out)!r} is one file for {len(chosen.names)} scenes: name one scene, or leave it out"
+        )
+    if out is not None and out.suffix.lower() != ".png":
+        raise UserError(f"--out {str(out)!r} must end in .png")
+    for name in chosen.names:
+        path = out or Path(f"scene-{_file_name(name)}.png")
+        if not path.parent.is_dir():
+            raise UserError(f"folder {str(path.parent)!r} of --out does not exist")
+        with console.status(f"{name}: reading"):
+            scene = load_scene(name, data)
+        with console.status(f"{name}: drawing"):
+            write_bytes(path, contact_sheet(scene))
+        console.say(f"contact sheet: {path}")
+        if record:
+            from matbench.recording import record_scene
+
+            with console.status(f"{name}: recording"):
+                record_scene(path.with_suffix(".rrd"), scene)
+            console.say(f"recording: matbench view {path.with_suffix('.rrd')}")
+    return DONE
+
+
+def _file_name(scene: str) -> str:
+    """``middlebury2003/teddy[size=half]`` -> ``middlebury2003-teddy-size-half``; a folder's last part."""
+    from matbench.scenes import own_folder
+    from matbench.spec import parse
+
+    spec = parse(scene)[0]
+    folder = own_folder(spec.name)
+    name = spec.name if folder is None else os.path.basename(os.path.abspath(folder))  # noqa: PTH100, PTH119
+    told = " ".join([name, *(f"{key} {value}" for key, value in spec.options.items())])
+    return re.sub(r"[^\w.+]+", "-", told).strip("-.") or "scene"
+
+
+@app.command(help_epilogue="")
+def check(name: str, *, data: Data = None) -> int:
+    """Say in words what is wrong with a scene: files, order of views, shift, rows, and whether truth explains them.
+
+    Order, shift and rows are measured on matched features; truth by warping: the other views,
+    sampled where it says, must look like the view it belongs to, and more so than with the truth
+    one pixel off. Ends with status 1 if there is a problem.
+
+    **Examples**
+
+    `matbench scene check my_scene`
+
+    `matbench scene check hci/antinous --data DATA`
+
+    Parameters
+    ----------
+    name
+        The folder of a scene of your own, or the name of any scene.
+    """
+    from rich.text import Text
+
+    from matbench.checking import Finding, check
+    from matbench.datasets.folder import describe
+    from matbench.scenes import load_scene, own_folder
+    from matbench.spec import parse
+
+    console, problems, files = Console(), 0, None
+    marks = {"good": ("✓", "green"), "note": ("•", "yellow"), "problem": ("✗", "bold red"), "unknown": ("?", "yellow")}
+
+    def tell(finding: Finding) -> None:
+        nonlocal problems
+        problems += finding.verdict == "problem"
+        mark, style = marks[finding.verdict]
+        line = Text.assemble((f"{mark} ", style), (f"{finding.topic}: ", "bold"), finding.text)
+        console.print(line, soft_wrap=True, highlight=False)
+
+    spec = parse(name)[0]
+    folder = own_folder(spec.name) or (spec.name if "/" not in spec.name else None)
+    with console.status("reading") as status:
+        if folder is not None:
+            stored = describe(folder)
+            for problem in stored.problems():
+                tell(Finding("files", "problem", problem))
+            if problems:
+                return FAILED
+            files = dict(zip(stored.labels, (path.name for path in stored.views), strict=True))
+        scene = load_scene(name, data)
+        size = f"{scene.n} views of {scene.width}x{scene.height} px"
+        tell(Finding("files", "good", f"{size}, reference view {scene.labels[scene.ref]}"))
+        status.update("matching features, warping views")
+        for finding in check(scene, [files[label] for label in scene.labels] if files else None):
+            tell(finding)
+    console.say(f"{problems} problem{'s' if problems != 1 else ''}" if problems else "no problems")
+    return FAILED if problems else DONE
+
+
+@app.command(help_epilogue="")
+def new(
+    folder: Path,
+    *,
+    disparities: Annotated[
+        tuple[float, float] | None,
+        Parameter(negative="", help="Least and largest, pixels per view step; default: measured."),
+    ] = None,
+    force: Annotated[bool, Parameter(negative="", help="Replace a scene.toml that is there.")] = False,
+) -> int:
+    """Write the scene.toml of a folder of images: the views in order, the range, and what else may stand there.
+
+    Images are sorted as people do (im2 before im10), then by where features show that they were
+    taken. Files called disp..., truth..., mask... are no views. The range is measured, with a wide
+    margin, unless you give it.
+
+    **Examples**
+
+    `matbench scene new my_scene`
+
+    `matbench scene new my_scene --disparities 0 24`
+
+    Parameters
+    ----------
+    folder
+        With the images: PNG, or binary PPM or PGM, all of one size.
+    """
+    from matbench.datasets import scaffold
+
+    console = Console()
+    with console.status("matching features"):
+        draft = scaffold.write(folder, disparities, force)
+    for remark in draft.remarks:
+        console.say(f"• {remark}")
+    console.say(f"written: {draft.path}")
+    console.say(f"next: matbench scene check {folder}")
+    return DONE

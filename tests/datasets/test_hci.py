@@ -1,0 +1,195 @@
+"""Light fields: rows and columns of 9x9 views, signed truth, ranges."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scene_files import Layers, check_one_line, pfm_bytes, write_png
+
+from matbench import load_scene
+from matbench.consistency import together, warping_errors
+from matbench.datasets.hci import RANGE, SCENES, read_range
+from matbench.errors import UserError
+from matbench.scene import Range, Scene
+from matbench.scenes import listings, select
+
+WORLD = Layers()
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A light field, all 81 views of it, with truth of every view but those of the first row."""
+    root = tmp_path_factory.mktemp("data")
+    folder = root / "hci" / "training" / "boxes"
+    folder.mkdir(parents=True)
+    for down in range(9):
+        for across in range(9):
+            place = 9 * down + across
+            write_png(folder / f"input_Cam{place:03}.png", WORLD.view(across - 4, down - 4))
+            if down:
+                truth = pfm_bytes(WORLD.truth(across - 4, down - 4), little=place % 2 == 0)
+                (folder / f"gt_disp_lowres_Cam{place:03}.pfm").write_bytes(truth)
+    (folder / "gt_disp_lowres.pfm").write_bytes(pfm_bytes(WORLD.truth()))
+    return root
+
+
+def _errors(scene: Scene, truth: np.ndarray | None = None) -> tuple[float, ...]:
+    error = together(warping_errors(scene, truth))
+    assert error is not None
+    return error.mean
+
+
+def _is_explained(scene: Scene) -> bool:
+    less, zero, more = _errors(scene)
+    reversed_sign = _errors(scene, -scene.truth[scene.ref])[1]
+    return zero < 0.5 * min(less, more) and zero < 0.2 * reversed_sign
+
+
+@pytest.mark.parametrize("row", [1, 4, 8])
+def test_a_row_is_explained_by_its_truth(root: Path, row: int) -> None:
+    scene = load_scene(f"hci/boxes[row={row}]", root)
+    assert scene.n == 9
+    assert scene.ref == 4
+    assert scene.labels == tuple("012345678")
+    np.testing.assert_array_equal(scene.views[2], WORLD.view(-2, row - 4))
+    np.testing.assert_array_equal(scene.truth[4], WORLD.truth(0, row - 4))
+    assert _is_explained(scene)
+
+
+@pytest.mark.parametrize("column", [0, 4, 7])
+def test_a_column_turned_is_explained_by_its_truth(root: Path, column: int) -> None:
+    scene = load_scene(f"hci/boxes[column={column}]", root)
+    assert scene.views.shape == (9, 96, 80, 3)
+    for y, x in ((0, 0), (10, 70), (79, 95), (40, 50)):
+        np.testing.assert_array_equal(
+            scene.views[:, 95 - x, y], [WORLD.view(column - 4, k - 4)[y, x] for k in range(9)]
+        )
+        assert scene.truth[4][95 - x, y] == WORLD.truth(column - 4, 0)[y, x]
+    assert _is_explained(scene)
+
+
+def test_turned_the_other_way_it_would_not_be_explained(root: Path) -> None:
+    scene = load_scene("hci/boxes[column=4]", root)
+    clockwise = Scene(
+        name="x",
+        views=scene.views[:, ::-1, ::-1],
+        labels=scene.labels,
+        ref=4,
+        disparities=scene.disparities,
+        truth={4: scene.truth[4][::-1, ::-1]},
+        pair_steps=1,
+    )
+    assert not _is_explained(clockwise)
+
+
+def test_views_are_chosen_and_truth_follows(root: Path) -> None:
+    scene = load_scene("hci/boxes[column=4 views=0:9:2 ref=6]", root)
+    assert scene.labels == ("0", "2", "4", "6", "8")
+    assert scene.ref == 3
+    assert scene.disparities == RANGE.scaled(2)
+    np.testing.assert_array_equal(scene.truth[2], 2 * np.rot90(WORLD.truth()))
+    assert _is_explained(scene)
+
+
+def test_a_row_without_truth_can_be_looked_at(root: Path) -> None:
+    scene = load_scene("hci/boxes[row=0]", root)
+    assert scene.truth == {}
+    assert scene.regions == {}
+    assert scene.ref == 4
+
+
+def test_antinous_is_explained_by_its_truth(data_root: Path) -> None:
+    scene = load_scene("hci/antinous", data_root)
+    assert scene.views.shape == (9, 512, 512, 3)
+    assert scene.disparities == RANGE, "no parameters.cfg"
+    assert -3.2 < scene.truth[4].min() < -3.1
+    assert 2.6 < scene.truth[4].max() < 2.7
+    assert _is_explained(scene)
+    assert {"all", "nonocc", "occ", "disc", "textureless"} <= set(scene.regions)
+    with pytest.raises(UserError, match=r"input_Cam\d+\.png is missing"):
+        load_scene("hci/antinous[column=4]", data_root)
+
+
+def test_listed_and_selected(root: Path) -> None:
+    known = {name: found for name, found in listings(root).items() if name.startswith("hci/")}
+    assert len(known) == sum(len(names.split()) for names in SCENES.values()) == 28
+    assert [name for name, found in known.items() if getattr(found, "present", False)] == ["hci/boxes"]
+    assert select("hci/*", root).names == ("hci/boxes",)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("hci/boxs", ["unknown scene of hci 'boxs'", "'boxes'"]),
+        ("hci/dino", ["hci/dino is not in", "training"]),
+        ("hci/../boxes", ["unknown scene"]),
+        ("hci/boxes[row=9]", ["row=9", "0 (top) to 8"]),
+        ("hci/boxes[row=-1]", ["row=-1"]),
+        ("hci/boxes[column=x]", ["column=x", "left"]),
+        ("hci/boxes[row=1 column=1]", ["cannot both"]),
+        (
+            "hci/boxes[size=half]",
+            ["unknown option of hci/boxes 'size'", "baseline, column, disparities, ref, row, views"],
+        ),
+        ("hci/boxes[row=2 views=8:9]", ["at least two"]),
+    ],
+)
+def test_what_does_not_exist_is_refused(root: Path, name: str, words: list[str]) -> None:
+    with pytest.raises(UserError) as caught:
+        load_scene(name, root)
+    assert all(word in str(caught.value) for word in words), caught.value
+    assert "\n" not in str(caught.value)
+
+
+@pytest.fixture
+def cfg(root: Path):
+    path = root / "hci/training/boxes/parameters.cfg"
+    yield path
+    path.unlink(missing_ok=True)
+
+
+def test_the_range_is_that_of_parameters_cfg(root: Path, cfg: Path) -> None:
+    cfg.write_text("[intrinsics]\nfstop = 100.0\n[meta]\nscene = boxes\ndisp_min = -2.2\ndisp_max = 1.4\nnote = 100%\n")
+    assert load_scene("hci/boxes", root).disparities == Range(-2.2, 1.4)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "disp_min"),
+        ("[meta]\ndisp_min = -1\n", "disp_max"),
+        ("[meta]\ndisp_min = one\ndisp_max = 2\n", "'one'"),
+        ("[meta]\ndisp_min = nan\ndisp_max = 2\n", "finite"),
+        ("[meta]\ndisp_min = 3\ndisp_max = 2\n", "empty"),
+        ("disp_min = 3\n", "cannot be read"),
+        ("[meta]\ndisp_min=1\ndisp_min=2\n", "cannot be read"),
+        ("[meta]\ndisp_min = %(disp_min)s\ndisp_max = 2\n", "disp_min"),
+        ("[meta]\n" + "x = 1\n" * 20000, "bytes"),
+    ],
+)
+def test_a_malformed_cfg_is_refused(root: Path, cfg: Path, text: str, words: str) -> None:
+    cfg.write_text(text)
+    with pytest.raises(UserError, match=r"parameters\.cfg") as caught:
+        load_scene("hci/boxes", root)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    st.one_of(
+        st.binary(max_size=80),
+        st.text(max_size=60).map(lambda text: f"[meta]\ndisp_min = {text}\ndisp_max = 3\n".encode()),
+        st.text("[]=:;#%()\n\t meta.disp_min019", max_size=80).map(str.encode),
+    )
+)
+def test_any_cfg_gives_a_finite_range_or_one_line(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "parameters.cfg").write_bytes(content)
+    try:
+        found = read_range(tmp_path)
+    except UserError as error:
+        check_one_line(error)
+    else:
+        assert np.isfinite([found.least, found.largest]).all()

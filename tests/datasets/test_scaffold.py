@@ -1,0 +1,132 @@
+"""Writing a scene.toml for a folder of images."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scene_files import pfm_bytes, write_png
+
+from matbench import load_scene
+from matbench.datasets.scaffold import natural, write
+from matbench.errors import UserError
+from matbench.scene import Range, Scene
+
+NUMBERS = (8, 9, 10, 11, 12)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene("synthetic/box[size=320x240]")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, scene: Scene) -> Path:
+    for number, view in zip(NUMBERS, scene.views, strict=True):
+        write_png(tmp_path / f"im{number}.png", view)
+    return tmp_path
+
+
+def test_names_sort_as_people_do() -> None:
+    assert sorted(["a10", "a9", "B1", "a", "9", "10"], key=natural) == ["9", "10", "a", "a9", "a10", "B1"]
+
+
+@given(st.lists(st.text("ab01٣²", max_size=5)))
+def test_any_names_can_be_sorted(names: list[str]) -> None:
+    assert sorted(sorted(names, key=natural)) == sorted(names)
+
+
+def test_the_scene_of_a_folder_of_images(folder: Path, scene: Scene) -> None:
+    draft = write(folder)
+    found = load_scene(str(folder))
+    assert found.labels == ("8", "9", "10", "11", "12")
+    np.testing.assert_array_equal(found.views, scene.views)
+    truth = scene.truth[scene.ref]
+    assert found.disparities.least <= truth.min() < truth.max() <= found.disparities.largest < 3 * truth.max()
+    assert any("measured" in remark for remark in draft.remarks)
+    assert "# reference" in draft.path.read_text()
+
+
+def test_a_given_range_is_kept(folder: Path) -> None:
+    write(folder, (-1.5, 24))
+    assert load_scene(str(folder)).disparities == Range(-1.5, 24)
+    with pytest.raises(UserError, match="empty"):
+        write(folder, (5, 1), replace=True)
+
+
+def test_views_are_listed_as_they_were_taken(tmp_path: Path, scene: Scene) -> None:
+    for name, view in zip("ebadc", scene.views, strict=True):
+        write_png(tmp_path / f"{name}.png", view)
+    draft = write(tmp_path)
+    np.testing.assert_array_equal(load_scene(str(tmp_path)).views, scene.views)
+    assert any("not by their names" in remark for remark in draft.remarks)
+
+
+def test_a_pair_named_the_wrong_way_round_is_put_right(tmp_path: Path, scene: Scene) -> None:
+    write_png(tmp_path / "1.png", scene.views[3])
+    write_png(tmp_path / "2.png", scene.views[2])
+    write(tmp_path)
+    np.testing.assert_array_equal(load_scene(str(tmp_path)).views, scene.views[2:4])
+
+
+def test_truth_files_are_no_views_and_are_offered(folder: Path, scene: Scene) -> None:
+    truth = scene.truth[scene.ref]
+    (folder / "disp10.pfm").write_bytes(pfm_bytes(truth))
+    write_png(folder / "truth9.png", np.rint(truth * 16).astype(np.uint8))
+    write_png(folder / "mask10.png", np.ones((240, 320), np.uint8))
+    write_png(folder / "thumbnail.png", scene.views[0][::4, ::4])
+    (folder / "broken.png").write_bytes(b"nothing")
+    (folder / "notes.txt").write_text("hello")
+    draft = write(folder)
+    found = load_scene(str(folder))
+    assert found.n == 5
+    np.testing.assert_array_equal(found.truth[2], truth)
+    assert found.ref == 2
+    text = draft.path.read_text()
+    assert '# [truth."im9.png"]\n# file = "truth9.png"\n# scale' in text
+    assert "mask10" not in text
+    said = " ".join(draft.remarks)
+    assert "thumbnail.png, 80x60 px" in said
+    assert "broken.png" in said
+
+
+def test_nothing_is_overwritten_unasked(folder: Path) -> None:
+    (folder / "scene.toml").write_text("mine")
+    with pytest.raises(UserError, match=r"a scene already: it holds scene\.toml; --force"):
+        write(folder)
+    assert (folder / "scene.toml").read_text() == "mine"
+    write(folder, replace=True)
+    assert load_scene(str(folder)).n == 5
+    (folder / "scene.toml").unlink()
+    (folder / "calib.txt").write_text("ndisp=20")
+    with pytest.raises(UserError, match=r"calib\.txt"):
+        write(folder)
+
+
+def test_without_features_the_range_is_called_a_guess(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        write_png(tmp_path / f"{name}.png", np.full((60, 80, 3), 99, np.uint8))
+    draft = write(tmp_path)
+    assert any("A GUESS" in remark for remark in draft.remarks)
+    assert "A GUESS" in draft.path.read_text()
+    assert load_scene(str(tmp_path)).n == 2
+
+
+def test_names_that_need_quoting(tmp_path: Path, scene: Scene) -> None:
+    for view, name in enumerate(['q"uote 1.png', "back\\slash 2.png", "déjà\tvu 3.png"]):
+        write_png(tmp_path / name, scene.views[view])
+    write(tmp_path)
+    assert load_scene(str(tmp_path)).n == 3
+
+
+@pytest.mark.parametrize("names", [[], ["one.png"]])
+def test_too_few_images_are_refused(tmp_path: Path, scene: Scene, names: list[str]) -> None:
+    for name in names:
+        write_png(tmp_path / name, scene.views[0])
+    (tmp_path / "photo.JPG").write_bytes(b"")
+    with pytest.raises(UserError, match=r"too few images.*\.JPG are not read: save them as PNG"):
+        write(tmp_path)
+    assert not (tmp_path / "scene.toml").exists()
+    with pytest.raises(UserError, match="does not exist"):
+        write(tmp_path / "none")
