@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from matbench import comparison
 from matbench.errors import UserError
 from matbench.scenes import DATA_VARIABLE, data_root, load_scene, select, user_root
 
@@ -58,6 +59,27 @@ def test_a_pattern_leaves_out_what_cannot_be_scored_and_says_so(root: Path) -> N
     assert found.left_out == {"no ground truth": ["middlebury2005/Computer"]}
     with pytest.raises(UserError, match=r"none can be compared \(middlebury2005/Computer: no ground truth\): see"):
         select("middlebury2005/C*", root)
+
+
+def test_a_prediction_needs_no_truth(root: Path) -> None:
+    found = select("middlebury2005/*[predict=right]", root)
+    assert found.names == ("middlebury2005/Art[predict=right]", "middlebury2005/Computer[predict=right]")
+    assert found.left_out == {}
+    scene = load_scene("middlebury2005/Computer[predict=right]", root)
+    assert (scene.truth, scene.labels[-1]) == ({}, "5")
+    assert scene.held_out is not None
+    assert scene.held_out.label == "6"
+
+
+def test_what_a_scene_has_not_is_left_out_of_patterns_only(root: Path, tmp_path: Path) -> None:
+    """From two views none can be withheld; nine there are not."""
+    asked = ["middlebury2006/A*[views=2,3,9 predict=right]", "middlebury2006/Baby1[views=3]"]
+    ready = comparison.prepare("sgbm", asked, data=root, out=tmp_path / "run")
+    assert set(ready.scenes) == {"middlebury2006/Aloe[predict=right views=3]", "middlebury2006/Baby1[views=3]"}
+    names = [f"middlebury2006/Aloe[views={n} predict=right]" for n in (2, 9)]
+    assert ready.left_out == {"the scenes have not these views": names}
+    with pytest.raises(UserError, match="at least three"):
+        comparison.prepare("sgbm", asked[1].replace("views=3", "views=2 predict=right"), data=root, out=tmp_path / "no")
 
 
 def test_sizes_that_a_dataset_reads_itself_are_left_to_it() -> None:

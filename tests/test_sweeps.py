@@ -183,6 +183,15 @@ def test_regions_that_move_and_methods_that_use_less_are_named() -> None:
     assert dict(sweep.limits) == {"a[views=5]": 5}
 
 
+def test_metrics_over_different_pixels_move_no_region() -> None:
+    """A prediction counts the pixels of another view."""
+    plan, results = run([method()], ["d/s0[noise=0,2,4]"], by_difficulty)
+    predicted = results[results["region"] == "all"].assign(metric="prediction_psnr", unit="dB", pixels=8)
+    (sweep,) = sweeps(plan, pd.concat([results, predicted]))
+    assert sweep.moving == ()
+    assert set(sweep.curves["metric"]) == {"bad_1", "prediction_psnr"}
+
+
 def test_the_table_holds_every_curve() -> None:
     plan, results = run([method(window=w) for w in (3, 5, 7)], ["d/s0[noise=0,2,4]"], by_difficulty)
     found = sweeps(plan, results)

@@ -221,6 +221,8 @@ def test_a_folder_is_named_as_any_path(folder: Path, monkeypatch: pytest.MonkeyP
     assert load_scene("desk[views=0:2 ref=0]").name == "./desk[ref=0 views=0:2]"
     assert select("./d*").names == ("./desk",)
     assert [load_scene(name).name for name in select("d*[views=1:3]").names] == ["./desk[views=1:3]"]
+    held = load_scene("desk[predict=right]")
+    assert (held.name, held.n) == ("./desk[predict=right]", 2)
     Path("synthetic").mkdir()
     assert own_folder("synthetic") is None, "a dataset's name is a dataset"
     assert own_folder("./synthetic") == "./synthetic"

@@ -112,6 +112,43 @@ def test_antinous_is_explained_by_its_truth(data_root: Path) -> None:
         load_scene("hci/antinous[column=4]", data_root)
 
 
+@pytest.mark.parametrize(
+    ("options", "labels", "ref"),
+    [
+        ("views=3", "048", "4"),
+        ("baseline=2", "345", "4"),
+        ("views=2 baseline=3", "47", "4"),
+        ("ref=1 views=3", "147", "1"),
+    ],
+)
+def test_views_are_chosen_by_number_and_baseline(root: Path, options: str, labels: str, ref: str) -> None:
+    scene = load_scene(f"hci/boxes[{options}]", root)
+    assert "".join(scene.labels) == labels
+    assert scene.labels[scene.ref] == ref
+
+
+def test_the_range_is_searched_that_is_asked_for(root: Path) -> None:
+    assert load_scene("hci/boxes[disparities=-1:2.5]", root).disparities == Range(-1, 2.5)
+
+
+def test_a_light_field_without_truth_is_there_but_not_scored(root: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "hci" / "test" / "herbs"
+    folder.mkdir(parents=True)
+    for place in range(36, 45):
+        write_png(folder / f"input_Cam{place:03}.png", WORLD.view(place - 40))
+    with pytest.raises(UserError, match=r"hci/herbs: no ground truth"):
+        select("hci/h*", tmp_path)
+    assert select("hci/h*[predict=left]", tmp_path).names == ("hci/herbs[predict=left]",)
+    with pytest.raises(UserError) as caught:
+        select("hci/d*", tmp_path)
+    assert "--data" in str(caught.value)
+    assert "matbench fetch" not in str(caught.value), "it brings no light fields"
+    known = listings(tmp_path)
+    assert [name for name, found in known.items() if name.startswith("hci/") and not getattr(found, "truth", True)] == [
+        f"hci/{name}" for name in ("bedroom", "bicycle", "herbs", "origami")
+    ]
+
+
 def test_listed_and_selected(root: Path) -> None:
     known = {name: found for name, found in listings(root).items() if name.startswith("hci/")}
     assert len(known) == sum(len(names.split()) for names in SCENES.values()) == 28
