@@ -117,11 +117,16 @@ def group(name: str, known: Iterable[str]) -> list[str]:
     return [one for one in known if fnmatchcase(one, name)]
 
 
-def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Selection:
+def select(selectors: str | Iterable[str], data: str | Path | None = None, needs_truth: bool = True) -> Selection:
     """The scenes that selectors mean; patterns match scenes that are present and have truth.
 
     A pattern with a size takes the scenes that are present in it, one with ``predict`` also those
     without truth.
+
+    Parameters
+    ----------
+    needs_truth
+        Are they to be scored? To be looked at, scenes need no truth.
 
     Raises
     ------
@@ -142,7 +147,7 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Se
             continue
         offered = {name: found for name in hits if isinstance(found := known[name], Listing)}
         present = {name: found for name, found in offered.items() if found.present or found.complete}
-        why = {name: _unfit(found, spec.options) for name, found in present.items()}
+        why = {name: _unfit(found, spec.options, needs_truth) for name, found in present.items()}
         fit = [name for name, reason in why.items() if not reason]
         if not fit:
             raise _no_match(spec, hits, why)
@@ -153,10 +158,10 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None) -> Se
     return Selection(tuple(names), left_out)
 
 
-def _unfit(listing: Listing, options: Mapping[str, str]) -> str:
-    """Why a scene cannot be compared with those options; empty if it can."""
+def _unfit(listing: Listing, options: Mapping[str, str], needs_truth: bool) -> str:
+    """Why a scene cannot be had with those options; empty if it can."""
     size = options.get("size")
-    if not listing.truth and "predict" not in options:
+    if needs_truth and not listing.truth and "predict" not in options:
         return _NO_TRUTH
     if size is None or listing.complete is None:
         return "" if listing.present else "not complete"

@@ -59,6 +59,7 @@ def test_a_pattern_leaves_out_what_cannot_be_scored_and_says_so(root: Path) -> N
     assert found.left_out == {"no ground truth": ["middlebury2005/Computer"]}
     with pytest.raises(UserError, match=r"none can be compared \(middlebury2005/Computer: no ground truth\): see"):
         select("middlebury2005/C*", root)
+    assert select("middlebury2005/C*", root, needs_truth=False).names == ("middlebury2005/Computer",)
 
 
 def test_a_prediction_needs_no_truth(root: Path) -> None:

@@ -56,7 +56,7 @@ def show(
 
     if not names:
         raise UserError("no scene: name one, such as 'matbench scene show synthetic/curved'")
-    chosen = select(names, data)
+    chosen = select(names, data, needs_truth=False)
     console = Console()
     for reason, scenes in chosen.left_out.items():
         console.say(f"without {', '.join(scenes)}: {reason}")
