@@ -11,7 +11,9 @@ from matbench.algorithm import Context, Estimate
 from matbench.algorithms.fusion import seen_from
 from matbench.algorithms.materiality.binarize import by_plane, by_ray, seen_rays, visible_cost
 from matbench.algorithms.materiality.consensus import consensus
-from matbench.algorithms.materiality.descent import Descent, Energy, edge_weights
+from matbench.algorithms.materiality.descent import Descent
+from matbench.algorithms.materiality.edges import edge_weights
+from matbench.algorithms.materiality.passes import Energy
 from matbench.algorithms.materiality.start import start
 from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import FULL, Matcher, Matching

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from matbench.algorithms.sampling import fine_rows
-from matbench.algorithms.similarity import Matcher, Matching, falloff, pairs
+from matbench.algorithms.similarity import Matcher, Matching, pairs
 from matbench.scene import Range, Scene
 
 
@@ -30,7 +30,7 @@ def darker(grey, y, sample, q):
 
 
 def twin(matcher: Matcher) -> np.ndarray:
-    """exp(-MSD / sigma^2), exp(-RMS / sigma) or 1 - mixed cost, tap by tap."""
+    """exp(-MSD / sigma^2), exp(-RMS / sigma), 1 - MSD / M or 1 - the mean cost, tap by tap."""
     space, how = matcher.space, matcher.settings
     rows = fine_rows(matcher.scene.views, space.fineness).astype(float)
     if not how.colour:
@@ -49,18 +49,25 @@ def twin(matcher: Matcher) -> np.ndarray:
                 inside = 0 <= y + dy < space.rows
                 if inside and min(ui, uj) + dx >= 0 and max(ui, uj) + dx < space.samples:
                     gap = rows[i, :, y + dy, ui + dx] - rows[j, :, y + dy, uj + dx]
+                    slopes = [slope(grey[v, y + dy], u + dx, q) for v, u in ((i, ui), (j, uj))]
+                    order = [darker(grey[v], y + dy, u + dx, q) for v, u in ((i, ui), (j, uj))]
+                    census = min(np.sum(order[0] != order[1]), 20) / 20
                     if how.similarity == "mixed":
-                        slopes = [slope(grey[v, y + dy], u + dx, q) for v, u in ((i, ui), (j, uj))]
-                        order = [darker(grey[v], y + dy, u + dx, q) for v, u in ((i, ui), (j, uj))]
                         cost = (
                             0.35 * min(np.mean(np.abs(gap)), limit) / 20
                             + 0.25 * min(abs(slopes[0] - slopes[1]), 10) / 10
                         )
-                        taps.append(cost + 0.40 * min(np.sum(order[0] != order[1]), 20) / 20)
+                        taps.append(cost + 0.40 * census)
+                    elif how.similarity == "census":
+                        taps.append(census)
                     else:
                         taps.append(min(np.mean(gap**2), limit**2))
         mean = np.mean(taps)
-        forms = {"ssd": np.exp(-mean / how.sigma**2), "rms": np.exp(-np.sqrt(mean) / how.sigma)}
+        forms = {
+            "ssd": np.exp(-mean / how.sigma**2),
+            "rms": np.exp(-np.sqrt(mean) / how.sigma),
+            "linear": max(0.0, 1 - mean / (how.truncation or 255) ** 2),
+        }
         out[y, p, k, c] = forms.get(how.similarity, max(0.0, 1 - mean))
     return out
 
@@ -75,7 +82,7 @@ def twin(matcher: Matcher) -> np.ndarray:
     fineness=st.integers(1, 3),
     window=st.sampled_from([1, 3, 5]),
     which=st.sampled_from(["all", "consecutive", "reference"]),
-    form=st.sampled_from(["ssd", "rms", "mixed"]),
+    form=st.sampled_from(["ssd", "rms", "linear", "census", "mixed"]),
     truncation=st.sampled_from([0.0, 60.0]),
     colour=st.booleans(),
     seed=st.integers(0, 99),
@@ -98,8 +105,8 @@ def test_similarity_is_its_equation(
         ),
     )
     rho, expected = matcher.all(), twin(matcher)
-    # half a byte of rounding, and half a step of the table
-    assert np.abs(rho / 255 - expected).max() <= 0.5 / 255 + 1e-3
+    # half a byte of rounding
+    assert np.abs(rho / 255 - expected).max() <= 0.5 / 255 + 2e-5
     assert not rho[expected == 0].any()
 
 
@@ -126,13 +133,49 @@ def test_pairs():
     assert pairs(4, "reference", 2).tolist() == [[0, 2], [1, 2], [2, 3]]
 
 
-def test_falloff_is_one_for_equal_windows_and_ends_at_zero():
-    for form in ("ssd", "rms"):
-        table = falloff(form, 9.0)
-        assert table[0] == 255
-        assert table[-1] == 0
-        assert (np.diff(table.astype(int)) <= 0).all()
-        assert (table[:-1] > 0).all()
+@pytest.mark.parametrize("sigma", [0.5, 9.0, 300.0])
+@pytest.mark.parametrize("form", ["ssd", "rms"])
+def test_falloff_is_exponential_from_one_to_zero(form, sigma):
+    # views that differ by 0, 1, 2, ... grey levels, one difference a row
+    views = np.zeros((2, 256, 3, 3), np.uint8)
+    views[1] = np.arange(256)[:, None, None]
+    scene = Scene("steps", views, ("0", "1"), 0, Range(0, 0), {}, 1.0)
+    rho = Matcher.of(scene, Matching(similarity=form, window=1, sigma=sigma, truncation=0.0)).all()[:, 0, 0, 1]
+    levels = np.arange(256) / sigma
+    expected = 255 * np.exp(-(levels**2) if form == "ssd" else -levels)
+    assert np.abs(rho - expected).max() <= 0.5 + 5e-3
+    assert (rho[0], (np.diff(rho.astype(int)) <= 0).all()) == (255, True)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"similarity": "rms"},
+        {"similarity": "linear"},
+        {"similarity": "census"},
+        {"similarity": "mixed"},
+        {"colour": False},
+        {"window": 5},
+        {"window": 1},
+        {"truncation": 20.0},
+        {"sigma": 30.0},
+    ],
+    ids=str,
+)
+def test_every_switch_changes_the_similarity(change):
+    base = {"similarity": "ssd", "sigma": 60.0, "truncation": 0.0}
+    scene = random_scene()
+    one, other = (Matcher.of(scene, Matching(**settings)).all() for settings in (base, base | change))
+    assert (one != other).mean() > 0.1
+
+
+def test_census_is_blind_to_brightness_and_contrast():
+    scene = random_scene(2, 8, 12, 0, 0)
+    even = np.stack([scene.views[0] // 2 * 2, scene.views[0] // 2])
+    assert Matcher.of(scene, Matching(similarity="census")).all().min() < 128
+    # halved even numbers keep their order
+    twins = Scene("twins", even, ("0", "1"), 0, Range(0, 0), {}, 1.0)
+    assert (Matcher.of(twins, Matching(similarity="census")).all() == 255).all()
 
 
 def test_fewer_views_rescale_the_answer():
