@@ -14,7 +14,7 @@ COLOUR, SLOPE, ORDER = 0.35, 0.25, 0.40  # weights of the three costs of ``mixed
 COLOUR_SPAN, SLOPE_SPAN, ORDER_SPAN = 20.0, 10.0, 20.0  # differences that cost the whole weight
 SQUARES, CENSUS, MIXED = range(3)  # what is averaged over a window
 EXPONENTIAL, ROOT, LINEAR = range(3)  # how the mean becomes a similarity
-TILE = 8  # planes
+TILE = 4  # planes
 
 
 @helper
