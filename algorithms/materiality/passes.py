@@ -24,20 +24,20 @@ Floats = NDArray[np.floating]
 def _extrapolate(now, before, beta, one, out):  # type: ignore[no-untyped-def]
     """out = now + beta (now - before), kept within [0, 1], and its sum."""
     zero = one - one
-    total = zero
+    total = 0.0
     if beta == zero:  # whatever `before` is
         for x in range(now.size):
             out[x] = now[x]
-            total += now[x]
+            total += np.float64(now[x])
     else:
         for x in range(now.size):
             value = min(max(now[x] + beta * (now[x] - before[x]), zero), one)
             out[x] = value
-            total += value
+            total += np.float64(value)
     return total
 
 
-@kernel
+@helper
 def _extrapolate_row(now, before, beta, one, out):  # type: ignore[no-untyped-def]
     """The same for the planes of a row; columns that `out` has more, half at either end, are left alone."""
     total = 0.0
@@ -54,6 +54,15 @@ def _count_rows(now, before, beta, one, top, end, counts):  # type: ignore[no-un
     mu = np.empty(now.shape[1:], now.dtype)
     for y in range(top, end):
         counts[y] = _extrapolate_row(now[y], before[y], beta, one, mu)
+
+
+@kernel
+def _border_rows(now, before, beta, one, block, beyond):  # type: ignore[no-untyped-def]
+    """The extrapolated rows just before and just after every `block` rows: (blocks, 2, planes, columns)."""
+    for place in range(beyond.shape[0]):
+        for side, y in enumerate((place * block - 1, (place + 1) * block)):
+            if 0 <= y < now.shape[0]:
+                _extrapolate_row(now[y], before[y], beta, one, beyond[place, side])
 
 
 @helper
@@ -279,10 +288,7 @@ class Energy:
         tied = self.across > 0 or self.along > 0
         # rows are overwritten in place: what their neighbours in other blocks read is set aside
         beyond = np.empty((-(-space.rows // block) if tied else 0, 2, *now.shape[1:]), now.dtype)
-        for place, rows in enumerate(beyond):
-            for out, y in zip(rows, (place * block - 1, (place + 1) * block), strict=True):
-                if 0 <= y < space.rows:
-                    _extrapolate_row(now[y], before[y], kind(beta), kind(1), out)
+        _border_rows(*extrapolated, block, beyond)
 
         local = threading.local()
 
