@@ -192,14 +192,15 @@ class SemiGlobal:
         image
             (H, W, 3) the view that is read.
         extra
-            (H, W, K) added to the cost where planes are chosen, not where their fraction is fitted.
+            (H, W, K) added to the cost where planes are chosen, not where their fraction is fitted;
+            overwritten.
 
         Returns
         -------
         (H, W) float32, NaN where all costs are.
         """
         fit = self.sums(cost, image, threads)
-        total = fit if extra is None else self.sums(cost + extra, image, threads)
+        total = fit if extra is None else self.sums(np.add(cost, extra, out=extra), image, threads)
         return np.asarray(winner(total, cost, fit))
 
     def sums(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:

@@ -7,7 +7,7 @@ import numpy as np
 from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
-from matbench.algorithms.features import census, gradient, luma
+from matbench.algorithms.features import alike, census, gradient, luma
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd
 from matbench.algorithms.sampling import fine_rows, search_space
@@ -18,8 +18,8 @@ from matbench.space import DisparitySpace
 
 PairSet = Literal["all", "consecutive", "reference"]
 Form = Literal["ssd", "rms", "linear", "census", "mixed"]
-# (views, phases, channels, H, samples) colours or luma, (views, phases, H, samples) gradients and census
-Features = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint64]]
+# (views, phases, channels, H, samples) colours or luma, (views, phases, H, samples) gradients, census, alike pixels
+Features = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint64], NDArray[np.uint64]]
 
 
 def _by_phase(values: NDArray[np.generic], fineness: int) -> NDArray[np.generic]:
@@ -72,9 +72,13 @@ class Matching:
         most this many grey levels; 0 = no limit.
     colour
         Compare colours, or only luma: 0.299 R + 0.587 G + 0.114 B.
+    alike
+        Grey levels: a census compares the eight next pixels and those whose colours in both windows
+        are within so many of the middle pixel's (h is scaled to 48 bits), as what lies across a
+        depth jump says nothing about a pixel; 0 = all 48.
     """
 
-    views: int = field(default=5, validator=all_or_several)
+    views: int = field(default=9, validator=all_or_several)
     fineness: int = field(default=0, validator=validators.ge(0))
     pairs: PairSet = field(default="reference", validator=validators.in_(get_args(PairSet)))
     similarity: Form = field(default="mixed", validator=validators.in_(get_args(Form)))
@@ -82,6 +86,7 @@ class Matching:
     sigma: float = field(default=9.0, validator=validators.gt(0))
     truncation: float = field(default=20.0, validator=validators.ge(0))
     colour: bool = True
+    alike: float = field(default=10.0, validator=validators.ge(0))
 
 
 @frozen(eq=False)
@@ -100,8 +105,9 @@ class Matcher:
         (pairs, 2) pairs of chosen views, left one first.
     rows
         (views, channels, H, samples) float32 rows sampled at the space's fineness: colours, or luma.
-    slopes, bits
-        (views, H, samples) horizontal gradients and census of the luma; no rows where nothing reads them.
+    slopes, bits, alike
+        (views, H, samples) horizontal gradients and census of the luma, and which pixels of the census
+        are like its middle; no rows where nothing reads them.
     settings
         How windows are compared.
     """
@@ -113,6 +119,7 @@ class Matcher:
     rows: NDArray[np.float32]
     slopes: NDArray[np.float32]
     bits: NDArray[np.uint64]
+    alike: NDArray[np.uint64]
     settings: Matching
 
     @classmethod
@@ -127,7 +134,9 @@ class Matcher:
         bits = census(grey if read in ("census", "mixed") else grey[:, :0], space.fineness)
         if not settings.colour:
             rows = grey[:, None]
-        return cls(chosen, indices, space, pairs(chosen.n, settings.pairs, chosen.ref), rows, slopes, bits, settings)
+        near = alike(rows if bits.size and settings.alike else rows[:, :, :0], space.fineness, settings.alike)
+        chosen_pairs = pairs(chosen.n, settings.pairs, chosen.ref)
+        return cls(chosen, indices, space, chosen_pairs, rows, slopes, bits, near, settings)
 
     @property
     def step(self) -> int:
@@ -185,15 +194,15 @@ class Matcher:
         self._fill(first, out)
         return out
 
-    def rays(self, phases: Features, first: int, end: int) -> NDArray[np.uint8]:
+    def rays(self, phases: Features, first: int, end: int, window: int | None = None) -> NDArray[np.uint8]:
         """(end - first, pairs, planes, width) what `block` holds at the whole pixels of the reference view.
 
         Windows end where the reference image does, too. `phases`, from the method of that name, are
-        computed once, as they serve every view and all rows.
+        computed once, as they serve every view and all rows. `window` may replace that of the settings.
         """
         space = self.space
         out = np.zeros((end - first, len(self.pairs), space.planes, space.width), np.uint8)
-        self._compare(phases, first, out, on_rays=True)
+        self._compare(phases, first, out, on_rays=True, window=window)
         return out
 
     def all(self, threads: int = 1) -> NDArray[np.uint8]:
@@ -205,15 +214,18 @@ class Matcher:
 
     def phases(self) -> Features:
         """The rows sorted by their phase within a pixel, so that every q-th sample is read contiguously."""
-        return tuple(_by_phase(part, self.space.fineness) for part in (self.rows, self.slopes, self.bits))  # type: ignore[return-value]
+        return tuple(_by_phase(part, self.space.fineness) for part in (self.rows, self.slopes, self.bits, self.alike))  # type: ignore[return-value]
 
     def _fill(self, first: int, out: NDArray[np.uint8]) -> None:
-        whole = self.rows[:, None], self.slopes[:, None], self.bits[:, None]
+        whole = self.rows[:, None], self.slopes[:, None], self.bits[:, None], self.alike[:, None]
         self._compare(whole, first, out, on_rays=False)
 
-    def _compare(self, features: Features, first: int, out: NDArray[np.uint8], on_rays: bool) -> None:
-        settings, (rows, slopes, bits) = self.settings, features
+    def _compare(
+        self, features: Features, first: int, out: NDArray[np.uint8], on_rays: bool, window: int | None = None
+    ) -> None:
+        settings, (rows, slopes, bits, near) = self.settings, features
         channels, limit = (0,) * rows.shape[2], settings.truncation
+        side = settings.window if window is None else window
         measure, shape, rate = {
             "ssd": (SQUARES, EXPONENTIAL, settings.sigma**-2),
             "rms": (SQUARES, ROOT, 1 / settings.sigma),
@@ -230,12 +242,15 @@ class Matcher:
                 slopes[j],
                 bits[i],
                 bits[j],
+                near[i],
+                near[j],
                 measure,
                 shape,
                 rate,
                 np.float32(limit or np.inf),
+                (0,) * bool(near.size),
                 channels,
-                (0,) * settings.window,
+                (0,) * side,
                 self.ray_spans(i, j) if on_rays else self.spans(i, j),
                 1 if on_rays else self.space.fineness,
                 first,

@@ -7,6 +7,7 @@ unsigned: signed ones might count from an array's end, which keeps loops from be
 
 import numpy as np
 
+from matbench.algorithms.features import CENSUS_BITS
 from matbench.algorithms.kernels import fill, helper, kernel, popcount
 
 FULL = 255  # a stored similarity of 1: similarities are kept in one byte
@@ -30,30 +31,58 @@ def _square_difference(left, right, fi, ui, fj, uj, row, channels, limit, out): 
 
 
 @helper
-def _census_difference(left, right, fi, ui, fj, uj, row, out):  # type: ignore[no-untyped-def]
+def _differing(a, b):  # type: ignore[no-untyped-def]
+    """How many of the 48 bits of two census words differ."""
+    return np.float32(np.int32(popcount(a ^ b)))
+
+
+@helper
+def _differing_among(a, b, alike):  # type: ignore[no-untyped-def]
+    """How many of 48 bits would differ, were all as those that are set in `alike`."""
+    return (
+        np.float32(CENSUS_BITS)
+        * np.float32(np.int32(popcount((a ^ b) & alike)))
+        / np.float32(np.int32(popcount(alike)))
+    )
+
+
+@helper
+def _census_difference(left, right, left_alike, right_alike, fi, ui, fj, uj, row, masked, out):  # type: ignore[no-untyped-def]
     """out = min(h, 20) / 20, with h how many bits differ."""
-    share, most = np.float32(1 / ORDER_SPAN), np.int32(ORDER_SPAN)
+    share, most = np.float32(1 / ORDER_SPAN), np.float32(ORDER_SPAN)
     for x in range(np.uintp(out.size)):
-        bits = left[fi, row, x + np.uintp(ui)] ^ right[fj, row, x + np.uintp(uj)]
-        out[x] = share * np.float32(min(np.int32(popcount(bits)), most))
+        i, j = x + np.uintp(ui), x + np.uintp(uj)
+        if len(masked) > 0:
+            differ = _differing_among(
+                left[fi, row, i], right[fj, row, j], left_alike[fi, row, i] & right_alike[fj, row, j]
+            )
+        else:
+            differ = _differing(left[fi, row, i], right[fj, row, j])
+        out[x] = share * min(differ, most)
 
 
 @helper
 def _mixed_difference(  # type: ignore[no-untyped-def]
-    left, right, left_slope, right_slope, left_bits, right_bits, fi, ui, fj, uj, row, channels, limit, out
-):
+    left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike,
+    fi, ui, fj, uj, row, masked, channels, limit, out,
+):  # fmt: skip
     """out = the cost of ``mixed`` at every pixel, between 0 and 1 unless `limit` allows more."""
     colour, slope = np.float32(COLOUR / COLOUR_SPAN / len(channels)), np.float32(SLOPE / SLOPE_SPAN)
     order, steepest = np.float32(ORDER / ORDER_SPAN), np.float32(SLOPE_SPAN)
-    most, zero = np.int32(ORDER_SPAN), np.float32(0)
+    most, zero = np.float32(ORDER_SPAN), np.float32(0)
     for x in range(np.uintp(out.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
         total = zero
         for c in range(len(channels)):
             total += abs(left[fi, c, row, i] - right[fj, c, row, j])
         steep = abs(left_slope[fi, row, i] - right_slope[fj, row, j])
-        differ = np.int32(popcount(left_bits[fi, row, i] ^ right_bits[fj, row, j]))
-        out[x] = colour * min(total, limit) + slope * min(steep, steepest) + order * np.float32(min(differ, most))
+        if len(masked) > 0:
+            differ = _differing_among(
+                left_bits[fi, row, i], right_bits[fj, row, j], left_alike[fi, row, i] & right_alike[fj, row, j]
+            )
+        else:
+            differ = _differing(left_bits[fi, row, i], right_bits[fj, row, j])
+        out[x] = colour * min(total, limit) + slope * min(steep, steepest) + order * min(differ, most)
 
 
 @helper
@@ -115,8 +144,8 @@ def _tap_shares(fineness, radius, width, weight):  # type: ignore[no-untyped-def
 
 @kernel
 def pair_rows(  # type: ignore[no-untyped-def]
-    left, right, left_slope, right_slope, left_bits, right_bits, measure, shape, rate, limit,
-    channels, taps, spans, fineness, y0, p, out,
+    left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike, measure, shape, rate, limit,
+    masked, channels, taps, spans, fineness, y0, p, out,
 ):  # fmt: skip
     """Similarities of pair p for the rows y0, y0 + 1, ... of `out` (rows, pairs, planes, columns).
 
@@ -131,6 +160,8 @@ def pair_rows(  # type: ignore[no-untyped-def]
         Of the exponential, or of the linear fall.
     limit
         The most that the colours of a pixel may differ: of mean squares, or of the sum of absolutes.
+    masked
+        A tuple, empty to compare all bits of the census; else only those set in both `alike`.
     channels, taps
         Tuples as long as there are channels, and taps along a side of the window: the compiler counts them.
     spans
@@ -167,11 +198,13 @@ def pair_rows(  # type: ignore[no-untyped-def]
                 elif measure == SQUARES:
                     _square_difference(left, right, fi, ui, fj, uj, row, channels, limit, cost)
                 elif measure == CENSUS:
-                    _census_difference(left_bits, right_bits, fi, ui, fj, uj, row, cost)
+                    _census_difference(
+                        left_bits, right_bits, left_alike, right_alike, fi, ui, fj, uj, row, masked, cost
+                    )
                 else:
                     _mixed_difference(
-                        left, right, left_slope, right_slope, left_bits, right_bits, fi, ui, fj, uj, row, channels,
-                        limit, cost,
+                        left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike,
+                        fi, ui, fj, uj, row, masked, channels, limit, cost,
                     )  # fmt: skip
                 if y < y0:
                     continue
