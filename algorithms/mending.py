@@ -49,8 +49,8 @@ def vote(found, image, asked, trusted, colour, distance, least, step, top, end, 
     """Weighted median of the trusted neighbours of every pixel that is asked about.
 
     Neighbours weigh exp(-|dI| / COLOUR - (|dx| + |dy|) / DISTANCE), with |dI| the largest difference
-    over the colours. The median is that of classes `step` wide from `least` on; a pixel that is
-    within a class of it, or without trusted neighbours, keeps its own.
+    over the colours. The median is that of classes `step` wide from `least` on, and no more than
+    what was found; a pixel that is within a class of it, or without trusted neighbours, keeps its own.
 
     Parameters
     ----------
@@ -65,7 +65,8 @@ def vote(found, image, asked, trusted, colour, distance, least, step, top, end, 
     """
     height, width = found.shape
     reach = distance.size - 1
-    votes = np.empty(np.int64((np.nanmax(found) - least) / step) + 1, np.float32)
+    most = np.nanmax(found)
+    votes = np.empty(np.int64((most - least) / step) + 1, np.float32)
     for y in range(top, end):
         for x in range(width):
             out[y, x] = found[y, x]
@@ -87,7 +88,7 @@ def vote(found, image, asked, trusted, colour, distance, least, step, top, end, 
                 while passed < total / 2 and place < votes.size - 1:
                     place += 1
                     passed += votes[place]
-                median = least + (place + np.float32(0.5)) * step
+                median = min(least + (place + np.float32(0.5)) * step, most)
                 if not abs(found[y, x] - median) <= step:
                     out[y, x] = median
 
@@ -95,12 +96,13 @@ def vote(found, image, asked, trusted, colour, distance, least, step, top, end, 
 def mend(
     maps: NDArray[np.float32], images: NDArray[np.uint8], pixel: float, rounds: int, threads: int = 1
 ) -> NDArray[np.float32]:
-    """(views, H, W) maps that agree better with one another, without NaN.
+    """(views, H, W) maps that agree better with one another, without NaN but for a view that is all NaN.
 
     In every round, for every view: a pixel is doubtful if it has less than TRUST times as many views
     that agree with it as contradict it (`count_votes`), or no answer; in the first round it loses its answer
     where fewer agree than contradict. Doubtful pixels take the weighted median of their trusted
-    neighbours (`vote`), and holes without any are filled from the background.
+    neighbours (`vote`), and holes without any are filled from the background. A view without
+    any trusted pixel is left as it is.
 
     Parameters
     ----------
@@ -130,7 +132,7 @@ def mend(
                 found[contradicting > agreeing] = np.nan
             trusted = (contradicting * TRUST <= agreeing) & ~np.isnan(found)
             if not trusted.any():
-                new[view] = found
+                new[view] = maps[view]
                 continue
 
             def ask(top: int, end: int, view: int = view) -> None:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from matbench.algorithms.features import alike
 from matbench.algorithms.sampling import fine_rows
 from matbench.algorithms.similarity import Matcher, Matching, pairs
 from matbench.scene import Range, Scene
@@ -21,12 +22,32 @@ def slope(row, sample, q):
     return (row[min(sample + q, row.size - 1)] - row[max(sample - q, 0)]) / 2
 
 
+def around(values, y, sample, q):
+    """(..., 7, 7) the pixels around, those beyond an edge taken from it."""
+    height, samples = values.shape[-2:]
+    near = np.arange(-3, 4)
+    return values[..., np.clip(y + near, 0, height - 1), :][..., np.clip(sample + q * near, 0, samples - 1)]
+
+
 def darker(grey, y, sample, q):
-    """Which of the 7x7 pixels around are darker, those beyond an edge taken from it."""
-    height, samples = grey.shape
-    around = np.arange(-3, 4)
-    taps = grey[np.clip(y + around, 0, height - 1)][:, np.clip(sample + q * around, 0, samples - 1)]
-    return taps < grey[y, sample]
+    """Which of the 7x7 pixels around are darker."""
+    return around(grey, y, sample, q) < grey[y, sample]
+
+
+def same_surface(rows, y, sample, q, most):
+    """Which of the 7x7 pixels are next to the middle, or within `most` grey levels of it in every channel."""
+    like = (np.abs(around(rows, y, sample, q) - rows[:, y, sample, None, None]) <= most).all(axis=0)
+    like[2:5, 2:5] = True
+    like[3, 3] = False
+    return like
+
+
+def differing(order, like):
+    """h: how many of the 48 pixels are darker in one view only, scaled up from those alike in both."""
+    if like is None:
+        return np.sum(order[0] != order[1])
+    both = like[0] & like[1]
+    return 48 * np.sum((order[0] != order[1]) & both) / both.sum()
 
 
 def twin(matcher: Matcher) -> np.ndarray:
@@ -51,7 +72,8 @@ def twin(matcher: Matcher) -> np.ndarray:
                     gap = rows[i, :, y + dy, ui + dx] - rows[j, :, y + dy, uj + dx]
                     slopes = [slope(grey[v, y + dy], u + dx, q) for v, u in ((i, ui), (j, uj))]
                     order = [darker(grey[v], y + dy, u + dx, q) for v, u in ((i, ui), (j, uj))]
-                    census = min(np.sum(order[0] != order[1]), 20) / 20
+                    like = [same_surface(rows[v], y + dy, u + dx, q, how.alike) for v, u in ((i, ui), (j, uj))]
+                    census = min(differing(order, like if how.alike else None), 20) / 20
                     if how.similarity == "mixed":
                         cost = (
                             0.35 * min(np.mean(np.abs(gap)), limit) / 20
@@ -85,10 +107,11 @@ def twin(matcher: Matcher) -> np.ndarray:
     form=st.sampled_from(["ssd", "rms", "linear", "census", "mixed"]),
     truncation=st.sampled_from([0.0, 60.0]),
     colour=st.booleans(),
+    most=st.sampled_from([0.0, 30.5, 100.5]),
     seed=st.integers(0, 99),
 )
 def test_similarity_is_its_equation(
-    n, height, width, least, extent, fineness, window, which, form, truncation, colour, seed
+    n, height, width, least, extent, fineness, window, which, form, truncation, colour, most, seed
 ):
     scene = random_scene(n, height, width, least, least + extent, seed)
     matcher = Matcher.of(
@@ -102,12 +125,29 @@ def test_similarity_is_its_equation(
             sigma=70.0,
             truncation=truncation,
             colour=colour,
+            alike=most,
         ),
     )
     rho, expected = matcher.all(), twin(matcher)
     # half a byte of rounding
     assert np.abs(rho / 255 - expected).max() <= 0.5 / 255 + 2e-5
     assert not rho[expected == 0].any()
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    shape=st.tuples(st.integers(1, 2), st.sampled_from([1, 3]), st.integers(1, 5), st.integers(1, 12)),
+    fineness=st.integers(1, 3),
+    most=st.sampled_from([1.0, 2.0, 4.0]),
+    seed=st.integers(0, 99),
+)
+def test_alike_is_what_is_near_or_of_a_colour(shape, fineness, most, seed):
+    rows = np.random.default_rng(seed).integers(-3, 4, shape).astype(np.float32)
+    bits = alike(rows, fineness, most)
+    assert bits.shape == (shape[0], *shape[2:])
+    for view, y, x in np.ndindex(bits.shape):
+        like = np.delete(same_surface(rows[view], y, x, fineness, most).ravel(), 24)
+        assert f"{int(bits[view, y, x]):048b}" == "".join(map(str, like.astype(int)))
 
 
 def test_blocks_and_threads_give_the_same():
@@ -159,14 +199,31 @@ def test_falloff_is_exponential_from_one_to_zero(form, sigma):
         {"window": 1},
         {"truncation": 20.0},
         {"sigma": 30.0},
+        {"similarity": "mixed", "alike": 0.0},
+        {"similarity": "census", "alike": 0.0},
     ],
     ids=str,
 )
 def test_every_switch_changes_the_similarity(change):
     base = {"similarity": "ssd", "sigma": 60.0, "truncation": 0.0}
+    if "alike" in change:
+        base |= {"similarity": change["similarity"], "truncation": 20.0}
     scene = random_scene()
     one, other = (Matcher.of(scene, Matching(**settings)).all() for settings in (base, base | change))
     assert (one != other).mean() > 0.1
+
+
+def test_a_masked_census_does_not_see_what_moves_behind_an_edge():
+    # a smooth strip before a background that differs between the views
+    views = np.random.default_rng(0).integers(160, 256, (2, 12, 24, 3), dtype=np.uint8)
+    views[:, :, 8:16] = np.random.default_rng(1).integers(40, 46, (12, 8, 3))
+    scene = Scene("strip", views, ("0", "1"), 0, Range(0, 0), {}, 1.0)
+    masked, whole = (
+        Matcher.of(scene, Matching(similarity="census", window=1, alike=most)).all()[:, 0, 0] for most in (10.0, 0.0)
+    )
+    assert (masked[:, 9:15] == 255).all()
+    assert (whole[:, [9, 10, 13, 14]] < 255).mean() < 1
+    assert masked[:, :7].mean() < 200
 
 
 def test_census_is_blind_to_brightness_and_contrast():
@@ -198,6 +255,7 @@ def test_fewer_views_rescale_the_answer():
         ("window", 4),
         ("sigma", 0.0),
         ("truncation", -1.0),
+        ("alike", -1.0),
     ],
 )
 def test_a_wrong_value_names_the_parameter(name, value):
