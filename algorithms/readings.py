@@ -27,38 +27,31 @@ class Readings(Fusion, SemiGlobal):
 
     def first(self, matcher: Matcher, threads: int = 1) -> NDArray[np.float32]:
         """(views, H, W) maps by the better half of the pairs, as planes of the space; mended."""
-
-        def cost(seen: Matcher, phases: Features) -> tuple[NDArray[np.float32], None]:
-            return self.first_cost(seen, threads, phases), None
-
-        return self._read_all(matcher, cost, threads)
+        return self._read_all(matcher, lambda seen, phases: self.first_cost(seen, threads, phases), threads)
 
     def again(
         self, matcher: Matcher, maps: NDArray[np.float32], material: float, threads: int = 1
     ) -> NDArray[np.float32]:
-        """The same by the pairs that see a point where the rays end as `maps` say, with
-        ``material (1 - mu)`` added where planes are chosen (`Fusion.seen_cost`)."""
+        """The same by the pairs that see a point where the rays end as `maps` say.
 
-        def cost(seen: Matcher, phases: Features) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        The cost of a point is that of `Fusion.seen_cost`, plus material (1 - mu).
+        """
+
+        def cost(seen: Matcher, phases: Features) -> NDArray[np.float32]:
             least, mu = self.seen_cost(seen, maps, threads, phases)
             np.subtract(1, mu, out=mu)
             mu *= np.float32(material)
-            return least, mu
+            return np.add(least, mu, out=least)
 
         return self._read_all(matcher, cost, threads)
 
     def _read_all(
-        self,
-        matcher: Matcher,
-        cost: Callable[[Matcher, Features], tuple[NDArray[np.float32], NDArray[np.float32] | None]],
-        threads: int,
+        self, matcher: Matcher, cost: Callable[[Matcher, Features], NDArray[np.float32]], threads: int
     ) -> NDArray[np.float32]:
         space, scene, phases = matcher.space, matcher.scene, matcher.phases()
         maps = np.empty((space.views, space.rows, space.width), np.float32)
         for view in range(space.views):
-            seen = seen_from(matcher, view)
-            least, extra = cost(seen, phases)
-            maps[view] = self.read(least, scene.views[view], threads, extra)
+            maps[view] = self.read(cost(seen_from(matcher, view), phases), scene.views[view], threads)
         steps = (maps + np.float32(space.first)) / np.float32(space.fineness)
         mended = mend(steps, scene.views, 1 / scene.pair_steps, self.mending, threads)
         return np.asarray(mended * np.float32(space.fineness) - np.float32(space.first), np.float32)

@@ -82,7 +82,7 @@ class Materiality(Matching, Readings):
         product of the visibilities of the pair's views other than the reference; at the fixed point
         that is the last reading.
     material
-        Weight of mu in the choice of planes; the fraction of a plane is fitted without it.
+        Weight of mu where planes are chosen.
     """
 
     presets: ClassVar[Mapping[str, Mapping[str, object]]] = {
@@ -131,6 +131,8 @@ class Materiality(Matching, Readings):
 
     def _fixed_point(self, matcher: Matcher, context: Context) -> Estimate:
         space, threads, probe = matcher.space, context.threads, context.probe
+        if probe.active:
+            self._tell_similarities(matcher, matcher.all(threads), probe)
         readings, changed = 0, []
         if self.start == "consensus":
             maps, readings = self.first(matcher, threads), 1
@@ -251,5 +253,5 @@ class Materiality(Matching, Readings):
             return self._binarize(matcher, mu, threads)
         view, space = matcher.scene.ref, matcher.space
         cost, material = visible_cost(mu, rho, space, matcher.pairs, view, self.hidden, threads)
-        extra = np.float32(self.material) * (1 - material) if self.material else None
-        return self.read(cost, matcher.scene.views[view], threads, extra)
+        cost += np.float32(self.material) * (1 - material)
+        return self.read(cost, matcher.scene.views[view], threads)
