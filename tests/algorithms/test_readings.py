@@ -42,7 +42,7 @@ def test_every_view_is_read_by_the_cost_on_its_own_rays(fineness, pair_steps, ro
     second = []
     for view in range(scene.n):
         cost, mu = Fusion().seen_cost(seen_from(matcher, view), maps)
-        second.append(reader.read(cost, scene.views[view], extra=np.float32(0.4) * (1 - mu)))
+        second.append(reader.read(cost + np.float32(0.4) * (1 - mu), scene.views[view]))
     expected = mended(matcher, np.stack(second), rounds)
     for threads in (1, 2):
         np.testing.assert_allclose(reader.again(matcher, maps, 0.4, threads), expected, atol=1e-5)

@@ -70,20 +70,19 @@ def twin(matcher: Matcher) -> np.ndarray:
                 inside = 0 <= y + dy < space.rows
                 if inside and min(ui, uj) + dx >= 0 and max(ui, uj) + dx < space.samples:
                     gap = rows[i, :, y + dy, ui + dx] - rows[j, :, y + dy, uj + dx]
-                    slopes = [slope(grey[v, y + dy], u + dx, q) for v, u in ((i, ui), (j, uj))]
-                    order = [darker(grey[v], y + dy, u + dx, q) for v, u in ((i, ui), (j, uj))]
-                    like = [same_surface(rows[v], y + dy, u + dx, q, how.alike) for v, u in ((i, ui), (j, uj))]
-                    census = min(differing(order, like if how.alike else None), 20) / 20
-                    if how.similarity == "mixed":
-                        cost = (
-                            0.35 * min(np.mean(np.abs(gap)), limit) / 20
-                            + 0.25 * min(abs(slopes[0] - slopes[1]), 10) / 10
-                        )
-                        taps.append(cost + 0.40 * census)
-                    elif how.similarity == "census":
-                        taps.append(census)
-                    else:
+                    if how.similarity not in ("mixed", "census"):
                         taps.append(min(np.mean(gap**2), limit**2))
+                        continue
+                    at = (i, ui + dx), (j, uj + dx)
+                    order = [darker(grey[v], y + dy, u, q) for v, u in at]
+                    like = [same_surface(rows[v], y + dy, u, q, how.alike) for v, u in at] if how.alike else None
+                    cost = min(differing(order, like), 20) / 20
+                    if how.similarity == "mixed":
+                        slopes = [slope(grey[v, y + dy], u, q) for v, u in at]
+                        cost *= 0.40
+                        cost += 0.35 * min(np.mean(np.abs(gap)), limit) / 20
+                        cost += 0.25 * min(abs(slopes[0] - slopes[1]), 10) / 10
+                    taps.append(cost)
         mean = np.mean(taps)
         forms = {
             "ssd": np.exp(-mean / how.sigma**2),
