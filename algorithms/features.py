@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from matbench.algorithms.kernels import helper, kernel
+from matbench.algorithms.kernels import fill, helper, kernel
 
 CENSUS_RADIUS = 3  # 7x7 pixels: 48 comparisons fit one 64-bit word
+CENSUS_BITS = (2 * CENSUS_RADIUS + 1) ** 2 - 1
 LUMA = (0.299, 0.587, 0.114)
 
 
@@ -52,4 +53,60 @@ def census(grey: NDArray[np.float32], fineness: int) -> NDArray[np.uint64]:
     wide = np.pad(grey, ((0, 0), (0, 0), (reach, reach)), mode="edge")
     bits = np.zeros(grey.shape, np.uint64)
     _census(wide, fineness, bits)
+    return bits
+
+
+@helper
+def _widen(taps, centre, most, gap):  # type: ignore[no-untyped-def]
+    for x in range(centre.size):
+        gap[x] = max(gap[x], abs(taps[x] - centre[x]) - most)
+
+
+@helper
+def _push(gap, near, bits):  # type: ignore[no-untyped-def]
+    one, zero = np.uint64(1), np.float32(0)
+    for x in range(bits.size):
+        bits[x] = (bits[x] << one) | np.uint64(near or gap[x] <= zero)
+
+
+@kernel
+def _alike(wide, fineness, most, bits):  # type: ignore[no-untyped-def]
+    views, height, samples = bits.shape
+    middle = CENSUS_RADIUS * fineness
+    gap = np.empty(samples, np.float32)
+    for i in range(views):
+        for y in range(height):
+            for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
+                other = min(max(y + dy, 0), height - 1)
+                for dx in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
+                    if dy == 0 and dx == 0:
+                        continue
+                    fill(-most, gap)
+                    start = middle + dx * fineness
+                    for c in range(wide.shape[1]):
+                        _widen(
+                            wide[i, c, other, start : start + samples],
+                            wide[i, c, y, middle : middle + samples],
+                            most,
+                            gap,
+                        )
+                    _push(gap, abs(dx) <= 1 and abs(dy) <= 1, bits[i, y])
+
+
+def alike(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.uint64]:
+    """(views, H, samples) which of the pixels of a census are likely on the same surface as the middle one.
+
+    A bit is set for the eight next to it, and where no channel differs by more than `most` grey
+    levels. What lies across a depth jump moves on its own between views and says nothing about the
+    pixel; its colour tends to differ.
+
+    Parameters
+    ----------
+    rows
+        (views, channels, H, samples) colours or luma.
+    """
+    reach = CENSUS_RADIUS * fineness
+    wide = np.pad(rows, ((0, 0), (0, 0), (0, 0), (reach, reach)), mode="edge")
+    bits = np.zeros((rows.shape[0], *rows.shape[2:]), np.uint64)
+    _alike(wide, fineness, np.float32(most), bits)
     return bits

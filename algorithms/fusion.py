@@ -1,12 +1,16 @@
 """One cost for every pixel and plane of a view, from the similarities of several pairs (SPEC 8)."""
 
+from collections.abc import Callable
+
 import numpy as np
-from attrs import evolve
+from attrs import evolve, field, frozen, validators
 from numpy.typing import NDArray
 
-from matbench.algorithms.kernels import helper, kernel
+from matbench.algorithms.kernels import fill, helper, kernel
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.similarity import FULL, Features, Matcher, pairs
+
+PRIOR, ENDED = 0.5, 0.05  # weight of what no view tells, against 1 for a view that sees a point; its materiality
 
 
 @helper
@@ -26,8 +30,8 @@ def _sum_first(part, place, taken, total):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def better_half(rho, low, high, mean):  # type: ignore[no-untyped-def]
-    """Mean of the better half, rounded up, of the similarities with both frusta; 0 where there is none.
+def better_half(rho, low, high, hidden, cost):  # type: ignore[no-untyped-def]
+    """1 - the mean of the better half, rounded up, of the similarities with both frusta; else `hidden`.
 
     Where half of the views cannot see a point, the other half still can.
 
@@ -37,13 +41,13 @@ def better_half(rho, low, high, mean):  # type: ignore[no-untyped-def]
         (rows, pairs, planes, columns) uint8 in 255ths.
     low, high
         (pairs, planes) the first column that both views of a pair see, and the one after the last.
-    mean
+    cost
         (rows, planes, columns) float32 in [0, 1], overwritten.
     """
     count, columns = rho.shape[1], rho.shape[3]
     best = np.empty((count, columns), np.uint8)
     taken = np.empty(columns, np.int32)
-    scale = np.float32(1 / FULL)
+    scale, one = np.float32(1 / FULL), np.float32(1)
     for k in range(rho.shape[2]):
         taken[:] = 0
         for p in range(count):
@@ -55,41 +59,229 @@ def better_half(rho, low, high, mean):  # type: ignore[no-untyped-def]
             for p in range(count):
                 for x in range(columns):
                     best[p, x] = rho[y, p, k, x]
-            total = mean[y, k]
+            total = cost[y, k]
             total[:] = 0
             for place in range((count + 1) // 2):  # sorts no further than the sum needs
                 for p in range(count - 1, place, -1):
                     _exchange(best[p - 1], best[p])
                 _sum_first(best[place], place, taken, total)
             for x in range(columns):
-                total[x] *= scale / np.float32(max(taken[x], 1))
+                total[x] = one - total[x] * scale / np.float32(max(taken[x], 1)) if taken[x] > 0 else hidden
 
 
-def view_cost(matcher: Matcher, threads: int = 1, phases: Features | None = None) -> NDArray[np.float32]:
-    """(H, W, planes) 1 - mean of the better half of rho on the reference view's pixel rays.
+@helper
+def _sight(found, k, through, ended, reached):  # type: ignore[no-untyped-def]
+    """V = k + 2 - d and w = 1 - |k - d|, within 0 and 1, of rays that end in the planes d = `found`."""
+    zero, one, two, plane = np.float32(0), np.float32(1), np.float32(2), np.float32(k)
+    for x in range(found.size):
+        behind = plane - found[x]
+        through[x] = min(max(behind + two, zero), one)
+        ended[x] += max(one - abs(behind), zero)
+        reached[x] += through[x]
 
-    NaN where no pair has both frusta. Similarities are computed by blocks of rows and not kept.
-    `phases`, if given, are those of the matcher.
+
+@helper
+def _add_seen(rho, first, second, total, weight):  # type: ignore[no-untyped-def]
+    one, scale = np.float32(1), np.float32(1 / FULL)
+    for x in range(rho.size):
+        both = first[x] * second[x]
+        total[x] += both * (one - scale * np.float32(rho[x]))
+        weight[x] += both
+
+
+@kernel
+def weigh_seen(rho, pairs, maps, view, spans, y0, fineness, hidden, cost, material):  # type: ignore[no-untyped-def]
+    """The mean dissimilarity of the pairs that see a point, and its materiality (see `seen_cost`).
+
+    Parameters
+    ----------
+    rho
+        (rows, pairs, planes, width) uint8 in 255ths; 0 where a frustum is left.
+    maps
+        (views, H, W) plane in which the ray of every pixel ends, fractions included.
+    spans
+        (views, planes, 6) what `Matcher.ray_spans` says of the view that is read and every other.
+    y0
+        Row of the views that is the first of `rho`.
+    cost, material
+        (rows, planes, width) float32, overwritten.
     """
-    space = matcher.space
-    features = matcher.phases() if phases is None else phases
-    spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
-    low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
-    columns = np.arange(space.width)[:, None, None]
-    unknown = ~((low <= columns) & (columns < high)).any(axis=1)
-    cost = np.empty((space.rows, space.width, space.planes), np.float32)
+    views, _, width = maps.shape
+    through = np.empty((views, width), np.float32)
+    ended, reached, weight = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    zero, one, prior = np.float32(0), np.float32(1), np.float32(PRIOR)
+    for y in range(rho.shape[0]):
+        for k in range(rho.shape[2]):
+            fill(np.float32(ENDED), ended)
+            fill(prior, reached)
+            fill(prior, weight)
+            for j in range(views):
+                fill(one if j == view else zero, through[j])
+                low, count = spans[j, k, 0], spans[j, k, 1]
+                if j != view and count > 0:
+                    start = spans[j, k, 5] + (1 if 2 * spans[j, k, 4] > fineness else 0)
+                    _sight(
+                        maps[j, y0 + y, start : start + count],
+                        k,
+                        through[j, low : low + count],
+                        ended[low : low + count],
+                        reached[low : low + count],
+                    )
+            total = cost[y, k]
+            fill(prior * hidden, total)
+            for p in range(pairs.shape[0]):
+                _add_seen(rho[y, p, k], through[pairs[p, 0]], through[pairs[p, 1]], total, weight)
+            for x in range(width):
+                total[x] /= weight[x]
+                material[y, k, x] = ended[x] / reached[x]
 
-    def fill(first: int, end: int) -> None:
-        mean = np.empty((end - first, space.planes, space.width), np.float32)
-        better_half(matcher.rays(features, first, end), low, high, mean)
-        np.subtract(1, mean.transpose(0, 2, 1), out=cost[first:end])
-        cost[first:end, unknown] = np.nan
 
-    over_rows(fill, space.rows, threads)
-    return cost
+@helper
+def _weights(image, y, x, radius, fall, weight):  # type: ignore[no-untyped-def]
+    """fall[largest difference over the colours] of the pixels around one, summing to 1; 0 beyond the image."""
+    height, width, _ = image.shape
+    total = np.float32(0)
+    for dy in range(-radius, radius + 1):
+        for dx in range(-radius, radius + 1):
+            share = np.float32(0)
+            if 0 <= y + dy < height and 0 <= x + dx < width:
+                gap = np.int64(0)
+                for c in range(3):
+                    gap = max(gap, abs(np.int64(image[y + dy, x + dx, c]) - np.int64(image[y, x, c])))
+                share = fall[gap]
+            weight[dy + radius, dx + radius] = share
+            total += share
+    for dy in range(weight.shape[0]):
+        for dx in range(weight.shape[1]):
+            weight[dy, dx] /= total
+
+
+@helper
+def _add(part, share, total):  # type: ignore[no-untyped-def]
+    for k in range(total.size):
+        total[k] += share * part[k]
+
+
+@kernel
+def support(cost, image, first, skipped, fall, radius, out):  # type: ignore[no-untyped-def]
+    """out = weighted mean of the costs around a pixel, as far as its neighbours are of its colour.
+
+    Parameters
+    ----------
+    cost
+        (rows, width, planes): `skipped` rows of the image before those of `out`, and as many after
+        as its window or the image has.
+    first
+        Row of the image that is the first of `out`.
+    image
+        (H, W, 3) uint8 view that is read.
+    fall
+        (256,) weight by the largest difference over the colours.
+    out
+        (rows, width, planes), overwritten.
+    """
+    weight = np.empty((2 * radius + 1, 2 * radius + 1), np.float32)
+    for row in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            _weights(image, first + row, x, radius, fall, weight)
+            total = out[row, x]
+            fill(np.float32(0), total)
+            for dy in range(-radius, radius + 1):
+                for dx in range(-radius, radius + 1):
+                    share = weight[dy + radius, dx + radius]
+                    if share > 0:
+                        _add(cost[row + skipped + dy, x + dx], share, total)
+
+
+@frozen(slots=False)  # a second base class must not have slots
+class Fusion:
+    """How the similarities of several pairs become one cost on the rays of a view.
+
+    Parameters
+    ----------
+    adaptive
+        Grey levels: a pixel's cost is the mean over the window, weighted by exp(-|dI| / adaptive)
+        with |dI| the largest difference to the middle pixel over the colours of the view; 0 = the
+        similarities are those of whole windows.
+    hidden
+        The cost of a point that no other view sees.
+    """
+
+    adaptive: float = field(default=10.0, validator=validators.ge(0))
+    hidden: float = field(default=0.72, validator=validators.ge(0))
+
+    def first_cost(self, matcher: Matcher, threads: int = 1, phases: Features | None = None) -> NDArray[np.float32]:
+        """(H, W, planes) 1 - mean of the better half of rho on the reference view's pixel rays."""
+        spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
+        low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
+
+        def combine(rho: NDArray[np.uint8], _: int, cost: NDArray[np.float32]) -> None:
+            better_half(rho, low, high, np.float32(self.hidden), cost)
+
+        return self._cost(matcher, threads, phases, combine)
+
+    def seen_cost(
+        self, matcher: Matcher, maps: NDArray[np.float32], threads: int = 1, phases: Features | None = None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Dissimilarity on the reference view's rays as far as other views see the points, and materiality.
+
+        With d_j the plane in which the ray of view j ends, w_j(k) = max(0, 1 - |k - d_j|) says where
+        it ends and V_j(k) = 1 - sum of w_j(k') over k' > k + 1 what it reaches: a plane does not
+        hide the one behind it, as surfaces may lie between the two. Then, over the pairs and over
+        the views j other than the one that is read,
+
+        - cost = (sum V_i V_j (1 - rho_ij) + 0.5 hidden) / (sum V_i V_j + 0.5),
+        - mu = (sum w_j + 0.05) / (sum V_j + 0.5).
+
+        Parameters
+        ----------
+        maps
+            (views, H, W) planes of the space, fractions included, no NaN.
+
+        Returns
+        -------
+        Two (H, W, planes) float32 arrays: the cost and mu.
+        """
+        space, view = matcher.space, matcher.scene.ref
+        spans = np.stack([matcher.ray_spans(view, j) for j in range(space.views)])
+        material = np.empty((space.rows, space.width, space.planes), np.float32)
+
+        def combine(rho: NDArray[np.uint8], top: int, cost: NDArray[np.float32]) -> None:
+            part = np.empty_like(cost)
+            weigh_seen(rho, matcher.pairs, maps, view, spans, top, space.fineness, np.float32(self.hidden), cost, part)
+            material[top : top + len(part)] = part.transpose(0, 2, 1)
+
+        return self._cost(matcher, threads, phases, combine), material
+
+    def _cost(
+        self,
+        matcher: Matcher,
+        threads: int,
+        phases: Features | None,
+        combine: Callable[[NDArray[np.uint8], int, NDArray[np.float32]], None],
+    ) -> NDArray[np.float32]:
+        """Similarities by blocks of rows, combined by ``combine(rho, first row, cost)`` and averaged; none is kept."""
+        space, image = matcher.space, matcher.scene.views[matcher.scene.ref]
+        features = matcher.phases() if phases is None else phases
+        radius = matcher.settings.window // 2 if self.adaptive else 0
+        fall = np.exp(np.arange(256) / -(self.adaptive or np.inf)).astype(np.float32)
+        cost = np.empty((space.rows, space.width, space.planes), np.float32)
+
+        def fill_rows(first: int, end: int) -> None:
+            top, bottom = max(0, first - radius), min(space.rows, end + radius)
+            part = np.empty((bottom - top, space.planes, space.width), np.float32)
+            combine(matcher.rays(features, top, bottom, 1 if self.adaptive else None), top, part)
+            turned = part.transpose(0, 2, 1)
+            if radius:
+                support(np.ascontiguousarray(turned), image, first, first - top, fall, radius, cost[first:end])
+            else:
+                cost[first:end] = turned
+
+        over_rows(fill_rows, space.rows, threads)
+        return cost
 
 
 def seen_from(matcher: Matcher, view: int) -> Matcher:
-    """The same views matched from one of them: it is the reference, and part of every pair."""
+    """The same views matched from one of them; of pairs of the reference, that view is part of every one."""
     scene = evolve(matcher.scene, ref=view, regions={})
-    return evolve(matcher, scene=scene, pairs=pairs(matcher.space.views, "reference", view))
+    return evolve(matcher, scene=scene, pairs=pairs(matcher.space.views, matcher.settings.pairs, view))

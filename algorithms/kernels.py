@@ -3,6 +3,7 @@
 from typing import Any
 
 from numba import njit
+from numba.extending import intrinsic
 
 # the flags let sums vectorise and keep NaN and infinity honest; no kernel is a callback of C
 OPTIONS: dict[str, Any] = {
@@ -17,3 +18,21 @@ INNER = OPTIONS | {"no_cpython_wrapper": True}
 kernel = njit(**OPTIONS)
 # one that only other loops call: without an entry from Python it compiles sooner
 helper = njit(**INNER)
+
+
+@helper
+def fill(value, row):  # type: ignore[no-untyped-def]
+    """row = value: a slice assigned to takes seconds to compile."""
+    for x in range(row.size):
+        row[x] = value
+
+
+def _popcount(_: Any, word: Any) -> Any:
+    def count(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
+        return builder.ctpop(arguments[0])
+
+    return word(word), count
+
+
+# how many bits of a word are set: the processor's own instruction where it has one
+popcount: Any = intrinsic(_popcount)

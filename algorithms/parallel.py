@@ -4,6 +4,11 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 
+def share(rows: int, threads: int) -> int:
+    """Rows a call where a call costs more than a few rows: eight calls a thread balance the load."""
+    return max(1, -(-rows // (8 * max(1, threads))))
+
+
 def over_rows(work: Callable[[int, int], None], rows: int, threads: int, block: int = 16) -> None:
     """Call ``work(first, end)`` for blocks that cover ``range(rows)``, on `threads` threads.
 

@@ -132,13 +132,12 @@ def aggregate(
 
 
 @kernel
-def winner(total, cost, fit):  # type: ignore[no-untyped-def]
+def winner(total, cost):  # type: ignore[no-untyped-def]
     """(H, W) float32 plane index of the least total, to a fraction of a plane by the equiangular fit.
 
-    Planes whose own cost is NaN cannot win; NaN where all are. With S the sums `fit` (which may be
-    `total` itself) at the winner k and beside it, the fraction is
-    ``(S[k-1] - S[k+1]) / (2 (max(S[k-1], S[k+1]) - S[k]))``; none at the ends of the range, beside
-    an unknown plane, or where S is less beside k.
+    Planes whose own cost is NaN cannot win; NaN where all are. With S the totals at the winner k and
+    beside it, the fraction is ``(S[k-1] - S[k+1]) / (2 (max(S[k-1], S[k+1]) - S[k]))``; none at the
+    ends of the range, beside an unknown plane, or where S is less beside k.
     """
     height, width, planes = total.shape
     found = np.empty((height, width), np.float32)
@@ -151,7 +150,7 @@ def winner(total, cost, fit):  # type: ignore[no-untyped-def]
                     best = k
             found[y, x] = best if best >= 0 else np.nan
             if 0 < best < planes - 1 and not np.isnan(known[best - 1]) and not np.isnan(known[best + 1]):
-                below, here, above = fit[y, x, best - 1], fit[y, x, best], fit[y, x, best + 1]
+                below, here, above = sums[best - 1], sums[best], sums[best + 1]
                 drop = max(below, above) - here
                 if drop > 0 and here <= min(below, above):
                     found[y, x] += (below - above) / (drop + drop)
@@ -176,13 +175,7 @@ class SemiGlobal:
     large_step: float = field(default=1.0, validator=validators.ge(0))
     contrast: float = field(default=25.0, validator=validators.gt(0))
 
-    def read(
-        self,
-        cost: NDArray[np.float32],
-        image: NDArray[np.uint8],
-        threads: int = 1,
-        extra: NDArray[np.float32] | None = None,
-    ) -> NDArray[np.float32]:
+    def read(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
         """(H, W) plane index, to a fraction of a plane, of the least cost in view of its neighbours.
 
         Parameters
@@ -191,16 +184,12 @@ class SemiGlobal:
             (H, W, K); NaN = unknown: such a plane is never the answer.
         image
             (H, W, 3) the view that is read.
-        extra
-            (H, W, K) added to the cost where planes are chosen, not where their fraction is fitted.
 
         Returns
         -------
         (H, W) float32, NaN where all costs are.
         """
-        fit = self.sums(cost, image, threads)
-        total = fit if extra is None else self.sums(cost + extra, image, threads)
-        return np.asarray(winner(total, cost, fit))
+        return np.asarray(winner(self.sums(cost, image, threads), cost))
 
     def sums(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
         """(H, W, K) path costs, summed over the eight directions; see `aggregate`."""

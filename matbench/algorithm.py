@@ -71,11 +71,14 @@ class Context:
         How many threads to use; the estimate must not depend on it.
     probe
         Where to tell what happens.
+    volume
+        Whether the estimate's volume is looked at; a method that needs none itself may save it otherwise.
     """
 
     seed: int = 0
     threads: int = 1
     probe: Probe = field(factory=Probe)
+    volume: bool = True
 
 
 @runtime_checkable

@@ -1,12 +1,26 @@
-"""Visibility, energy and exact gradient of one epipolar plane (SPEC 1-2), in float32 or float64.
+"""Visibility, energy, exact gradient and step of one epipolar plane (SPEC 1-2), in float32 or float64.
 
-Arrays of a row: `mu` (planes, columns) over the target points; `seen` (views, planes, samples)
-and the workspaces (views, samples) in the columns of each view, so that a frustum (equation 4) is
-the whole row and nothing branches. View i starts in plane k at column i (first + k) - origin.
-`one` is 1 in the type of the arrays: it keeps bare literals from widening the arithmetic.
+Arrays of a row: `mu` (planes, columns) over the target points; what belongs to a view lies in its
+own samples, so that a ray keeps its place from plane to plane. View i starts in plane k at column
+start = i (first + k) - origin, so column x is its sample x - start. Rows of a view have a `margin` of
+zeros at both ends: there any column is a sample of any view, the frustum (equation 4) is where V is
+not 0, and nothing branches. Offsets are unsigned: signed ones might count from an array's end, which
+the compiler would have to watch.
+
+Residuals are kept in units of rho, so that bytes are read as they are: with `full` such units to 1,
+r = full mu V_i V_j - rho, slopes are full / 2 dE/dmu and energies full^2 E.
 """
 
-from matbench.algorithms.kernels import helper, kernel
+import numpy as np
+
+from matbench.algorithms.kernels import fill, helper, kernel
+
+
+@helper
+def copy(values, row):  # type: ignore[no-untyped-def]
+    """row = values."""
+    for x in range(row.size):
+        row[x] = values[x]
 
 
 @helper
@@ -16,162 +30,199 @@ def _dim(through, mu, one, beyond):  # type: ignore[no-untyped-def]
         beyond[x] = through[x] * (one - mu[x])
 
 
-@kernel
-def see_row(mu, first, origin, one, seen):  # type: ignore[no-untyped-def]
-    """V_i(s) = product of (1 - mu) over the nearer points on the ray (equation 3), near to far."""
-    views, planes, samples = seen.shape
-    for i in range(views):
-        seen[i, planes - 1] = one
-        for k in range(planes - 1, 0, -1):
-            start = i * (first + k) - origin
-            _dim(seen[i, k], mu[k, start : start + samples], one, seen[i, k - 1])
-
-
 @helper
-def _match(mu, vi, vj, rho, scale, slope, pull_i, pull_j):  # type: ignore[no-untyped-def]
-    """Residuals r = mu V_i V_j - rho of one pair in one plane: adds 2 r V_i V_j to `slope`.
-
-    `pull_i` gains dE/dV_i = 2 r mu V_j and `pull_j` alike. Returns the sum of r^2.
-    """
-    energy = scale - scale
-    for x in range(mu.size):
-        both = vi[x] * vj[x]
-        r = mu[x] * both - scale * rho[x]
-        energy += r * r
-        twice = r + r
-        slope[x] += twice * both
-        pull = twice * mu[x]
-        pull_i[x] += pull * vj[x]
-        pull_j[x] += pull * vi[x]
-    return energy
-
-
-@helper
-def _shade(mu, through, pull, one, slope, behind):  # type: ignore[no-untyped-def]
-    """What a point takes from all behind it on a ray: slope -= V A, then A = g + (1 - mu) A; g = 0 again."""
-    for x in range(mu.size):
-        slope[x] -= through[x] * behind[x]
-        behind[x] = pull[x] + (one - mu[x]) * behind[x]
-        pull[x] = one - one
+def _dim_more(mu, one, through):  # type: ignore[no-untyped-def]
+    """The same in place."""
+    for x in range(through.size):
+        through[x] *= one - mu[x]
 
 
 @kernel
-def data_row(mu, seen, rho, scale, pairs, first, origin, one, slope, behind, pull):  # type: ignore[no-untyped-def]
-    """E_data of a row (equation 6) and its exact gradient (SPEC 2), far to near.
+def see_row(mu, first, origin, one, seen):  # type: ignore[no-untyped-def]
+    """V_i(s) = product of (1 - mu) over the nearer points on the ray (equation 3), near to far.
 
     Parameters
     ----------
     mu
         (planes, columns) materialities.
     seen
-        (views, planes, samples) their visibilities from `see_row`.
+        (views, planes, samples), overwritten: their visibilities.
+    """
+    views, planes, samples = seen.shape
+    for i in range(views):
+        fill(one, seen[i, planes - 1])
+        for k in range(planes - 1, 0, -1):
+            start = i * (first + k) - origin
+            _dim(seen[i, k], mu[k, start : start + samples], one, seen[i, k - 1])
+
+
+@helper
+def mark_layers(mu, first, origin, one, depth, marks):  # type: ignore[no-untyped-def]
+    """V of the nearest plane of every `depth` planes: marks (layers, views, samples), overwritten."""
+    layers, views, samples = marks.shape
+    for i in range(views):
+        fill(one, marks[layers - 1, i])
+        for layer in range(layers - 1, 0, -1):
+            through = marks[layer - 1, i]
+            copy(marks[layer, i], through)
+            for k in range(min((layer + 1) * depth, mu.shape[0]) - 1, layer * depth - 1, -1):
+                start = i * (first + k) - origin
+                _dim_more(mu[k, start : start + samples], one, through)
+
+
+@helper
+def see_layer(mu, mark, bottom, top, first, origin, one, margin, seen):  # type: ignore[no-untyped-def]
+    """V of the planes bottom..top of a row from that of plane top - 1, into `seen` (depth, views, wide)."""
+    views, samples = mark.shape
+    for i in range(views):
+        copy(mark[i], seen[top - 1 - bottom, i, margin : margin + samples])
+        for k in range(top - 1, bottom, -1):
+            start = i * (first + k) - origin
+            _dim(
+                seen[k - bottom, i, margin : margin + samples],
+                mu[k, start : start + samples],
+                one,
+                seen[k - bottom - 1, i, margin : margin + samples],
+            )
+
+
+@helper
+def chain(  # type: ignore[no-untyped-def]
+    mu, seen, rho, y, k, view, links, place, slide, full, one, behind, slope, pull, step, bias, new, slopes
+):
+    """Consecutive pairs of one plane from `view` on, as many as the tuple `links` is long, in one loop over x.
+
+    At every point, view after view: r = full mu V_i V_j - rho; the slope gains r V_i V_j - V_i A_i;
+    A_i = g_i + (1 - mu) A_i with g_i = mu (r' V_h + r V_j), h and r' being those of the pair before.
+    That the number of views is known to the compiler keeps all of it in registers.
+
+    Parameters
+    ----------
+    mu, slope
+        (columns,) of this plane. A `slope` of None starts at 0.
+    seen, behind
+        (views, wide) V and A of SPEC 2. `place` is column 0 in the row of `view`; in the next
+        view's it is `slide` less.
     rho
-        (pairs, planes, columns) similarities in units of `scale`; 0 outside either frustum.
-    pairs
-        (pairs, 2) views of each pair.
-    slope
-        (planes, columns), overwritten: dE_data/dmu.
-    behind, pull
-        (views, samples) workspace: A_i of SPEC 2, and g_i.
+        (rows, pairs, planes, columns).
+    pull
+        (columns,) r V of the pair before in, that of the last pair out; None starts at 0.
+    new, slopes
+        (rows, planes, columns). With `new` the last view is finished, too, the stepped point
+        goes there, and its slope to `slopes` unless that is None. Without, slope and pull go on.
 
     Returns
     -------
-    E_data of the row.
+    Sum of r^2.
     """
-    views, planes, samples = seen.shape
-    energy = 0.0
-    slope[:] = 0
-    behind[:] = 0
-    pull[:] = 0
-    for k in range(planes):
-        for p in range(pairs.shape[0]):
-            i, j = pairs[p, 0], pairs[p, 1]
-            start_i, start_j = i * (first + k) - origin, j * (first + k) - origin
-            low, high = max(start_i, start_j), min(start_i, start_j) + samples
-            if low < high:
-                energy += _match(
-                    mu[k, low:high],
-                    seen[i, k, low - start_i : high - start_i],
-                    seen[j, k, low - start_j : high - start_j],
-                    rho[p, k, low:high],
-                    scale,
-                    slope[k, low:high],
-                    pull[i, low - start_i : high - start_i],
-                    pull[j, low - start_j : high - start_j],
-                )
-        for i in range(views):
-            start = i * (first + k) - origin
-            _shade(
-                mu[k, start : start + samples], seen[i, k], pull[i], one, slope[k, start : start + samples], behind[i]
-            )
+    zero = one - one
+    kind = mu.dtype.type
+    energy = zero
+    for x in range(np.uintp(mu.size)):
+        m = mu[x]
+        at = x + np.uintp(place)
+        v = seen[view, at]
+        gained = zero if slope is None else slope[x]
+        before = zero if pull is None else pull[x]
+        for link in range(len(links)):
+            i = view + link
+            beside = x + np.uintp(place - (link + 1) * slide)
+            w = seen[i + 1, beside]
+            both = v * w
+            r = full * m * both - kind(rho[y, i, k, x])
+            energy += r * r
+            a = behind[i, at]
+            gained += r * both - v * a
+            behind[i, at] = a + m * (before + r * w - a)
+            before = r * v
+            at, v = beside, w
+        if new is None:
+            if slope is not None:
+                slope[x] = gained
+            if pull is not None:
+                pull[x] = before
+        else:
+            i = view + len(links)
+            a = behind[i, at]
+            gained -= v * a
+            behind[i, at] = a + m * (before - a)
+            new[y, k, x] = min(max(m - step * (gained + bias), zero), one)
+            if slopes is not None:
+                slopes[y, k, x] = gained + bias
     return energy
 
 
 @helper
-def _tie(here, there, weight, strength, slope):  # type: ignore[no-untyped-def]
-    """strength w (here - there)^2: adds its derivative by `here` to `slope`, returns its sum."""
-    energy = strength - strength
-    for x in range(here.size):
-        gap = here[x] - there[x]
-        pull = strength * weight[x] * gap
-        energy += pull * gap
-        slope[x] += pull + pull
+def match(mu, vi, vj, rho, full, pull_i, pull_j):  # type: ignore[no-untyped-def]
+    """Any pair in one plane: `pull_i` gains r V_j and `pull_j` r V_i. Returns the sum of r^2."""
+    kind = mu.dtype.type
+    energy = full - full
+    for x in range(mu.size):
+        r = full * mu[x] * vi[x] * vj[x] - kind(rho[x])
+        energy += r * r
+        pull_i[x] += r * vj[x]
+        pull_j[x] += r * vi[x]
     return energy
 
 
 @helper
-def _tie_along(mu, weight, strength, slope):  # type: ignore[no-untyped-def]
-    """The same between neighbours of a plane's row: weight[x] ties x and x + 1."""
-    energy = strength - strength
-    n = mu.size - 1
-    for x in range(n):
-        gap = mu[x + 1] - mu[x]
-        energy += strength * weight[x] * gap * gap
-    twice = strength + strength
-    slope[0] -= twice * weight[0] * (mu[1] - mu[0])
-    for x in range(1, n):
-        slope[x] += twice * (weight[x - 1] * (mu[x] - mu[x - 1]) - weight[x] * (mu[x + 1] - mu[x]))
-    slope[n] += twice * weight[n - 1] * (mu[n] - mu[n - 1])
-    return energy
+def shade(mu, through, half, slope, pull, behind):  # type: ignore[no-untyped-def]
+    """One view after all its pairs, which share out r V_i V_j evenly: A = g + (1 - mu) A, and no pull any more."""
+    zero = half - half
+    for x in range(mu.size):
+        g, a = pull[x], behind[x]
+        slope[x] += through[x] * (half * g - a)
+        behind[x] = a + mu[x] * (g - a)
+        pull[x] = zero
 
 
-@kernel
-def smooth_row(mu, above, below, w_above, w_below, w_along, across, along, slope):  # type: ignore[no-untyped-def]
-    """Adjacent-plane part of E_smooth (SPEC 4): what ties a row to the next one and along itself.
+@helper
+def descend(mu, slope, y, k, step, bias, one, new, slopes):  # type: ignore[no-untyped-def]
+    """new = mu - step (slope + bias), kept within [0, 1], in row y and plane k; unless None, `slopes` gets it."""
+    zero = one - one
+    out = new[y, k]
+    for x in range(mu.size):
+        out[x] = min(max(mu[x] - step * (slope[x] + bias), zero), one)
+    if slopes is not None:
+        for x in range(mu.size):
+            slopes[y, k, x] = slope[x] + bias
+
+
+@helper
+def tie(mu, above, below, w_above, w_below, w_along, across, along, slope):  # type: ignore[no-untyped-def]
+    """Adjacent-plane part of E_smooth (SPEC 4) for one plane of a row: what ties it to the next row and along itself.
 
     Parameters
     ----------
     mu, above, below
-        (planes, columns) materialities of row y, y - 1 and y + 1; at the image's border, those
-        of row y itself.
-    w_above, w_below, w_along
-        (planes, columns) edge weights in 255ths between y - 1 and y, y and y + 1, x and x + 1.
+        (columns + 2,) materialities of row y, y - 1 and y + 1 with a column more at either end; at
+        the image's border, those of row y itself.
+    w_above, w_below
+        (columns,) uint8 edge weights between y - 1 and y, y and y + 1.
+    w_along
+        (columns + 1,) those between x - 1 and x; 0 at the ends.
     across, along
-        lambda_y / 255 and lambda_x / 255.
+        lambda_y and lambda_x for one unit of weight and slope.
     slope
-        (planes, columns): gains the derivative.
+        (columns,), overwritten: half the derivative.
 
     Returns
     -------
-    lambda_y sum w (mu(y + 1) - mu(y))^2 + lambda_x sum w (mu(x + 1) - mu(x))^2 of the row.
+    across sum w (mu(y + 1) - mu(y))^2 + along sum w (mu(x + 1) - mu(x))^2.
     """
-    energy = 0.0
-    for k in range(mu.shape[0]):
-        _tie(mu[k], above[k], w_above[k], across, slope[k])
-        energy += _tie(mu[k], below[k], w_below[k], across, slope[k])
-        if mu.shape[1] > 1:
-            energy += _tie_along(mu[k], w_along[k], along, slope[k])
-    return energy
-
-
-@kernel
-def total_row(mu):  # type: ignore[no-untyped-def]
-    """Sum of the materialities of a row."""
-    energy = 0.0
-    for k in range(mu.shape[0]):
-        part = mu[k, 0] - mu[k, 0]
-        row = mu[k]
-        for x in range(row.size):
-            part += row[x]
-        energy += part
+    kind = mu.dtype.type
+    energy = across - across
+    before, here, after = mu[:-2], mu[1:-1], mu[2:]
+    up, down, w_before, w_after = above[1:-1], below[1:-1], w_along[:-1], w_along[1:]
+    for x in range(slope.size):
+        m = here[x]
+        fall, rise = m - down[x], m - after[x]
+        next_row, next_column = across * kind(w_below[x]) * fall, along * kind(w_after[x]) * rise
+        energy += next_row * fall + next_column * rise
+        slope[x] = (
+            next_row
+            + next_column
+            + across * kind(w_above[x]) * (m - up[x])
+            + along * kind(w_before[x]) * (m - before[x])
+        )
     return energy

@@ -7,13 +7,16 @@ import numpy as np
 from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
-from matbench.algorithm import Context, Estimate
+from matbench.algorithm import Context, Estimate, Probe
 from matbench.algorithms.fusion import seen_from
+from matbench.algorithms.holes import fill_from_background
 from matbench.algorithms.materiality.binarize import by_plane, by_ray, seen_rays, visible_cost
 from matbench.algorithms.materiality.consensus import consensus
-from matbench.algorithms.materiality.descent import Descent, Energy, edge_weights
+from matbench.algorithms.materiality.descent import Descent
+from matbench.algorithms.materiality.edges import edge_weights
+from matbench.algorithms.materiality.passes import Energy
 from matbench.algorithms.materiality.start import start
-from matbench.algorithms.semiglobal import SemiGlobal
+from matbench.algorithms.readings import Readings
 from matbench.algorithms.similarity import FULL, Matcher, Matching
 from matbench.scene import Scene
 from matbench.space import Volume
@@ -21,12 +24,12 @@ from matbench.space import Volume
 Start = Literal["mean", "soft", "consensus"]
 Count = Literal["row", "global"]
 Target = Literal["image", "union"]
-Optimiser = Literal["gradient", "fista"]
+Optimiser = Literal["fixed_point", "gradient", "fista"]
 Binarization = Literal["plane", "ray", "volume"]
 
 
 @frozen
-class Materiality(Matching, SemiGlobal):
+class Materiality(Matching, Readings):
     """The materiality map (paper; SPEC 1-4): a fuzzy map mu of surface points over disparity space.
 
     It minimises E = E_data + E_smooth (5) over mu in [0, 1], with
@@ -37,18 +40,19 @@ class Materiality(Matching, SemiGlobal):
       + along sum w (mu(x + 1) - mu(x))^2 (SPEC 4), edge weights w = exp(-|dI| / edge),
 
     by projected gradient with the exact derivative of SPEC 2, and reads the map in the reference view.
-    Parameters of similarity and reader are those of `Matching` and `SemiGlobal`.
+    The default solver is a fixed point instead (SPEC 8): the maps of all views say how far their rays
+    reach, so V and mu follow; with these all views are read again, as far as other views see each point.
+    Parameters of similarity and reader are those of `Matching` and `Readings`.
 
     Parameters
     ----------
     start
         ``mean``: mu = mean rho, as in the paper; ``soft``: exp(sharpness (mean rho - 1)),
-        normalised along each ray and averaged over the views; ``consensus`` (SPEC 8): every view is
-        read as the control reads the reference, w_i = exp(-sharpness (mean path cost)) normalised
-        along its rays says where they end, V_i(d) = 1 - sum of w_i more than a plane nearer what
-        they reach, and mu = (sum w_i + 0.025) / (sum V_i + 0.25).
+        normalised along each ray and averaged over the views; ``consensus``: of the rays that
+        reach a point, the share that ends there (`consensus`), by the maps of all views that the
+        control reads.
     sharpness
-        Of the start.
+        Of the ``soft`` start.
     count
         lambda of the count term (7).
     counted
@@ -63,21 +67,22 @@ class Materiality(Matching, SemiGlobal):
     edge
         Grey levels of difference over which those ties weaken to 1/e.
     optimiser
-        ``gradient``, or ``fista`` (accelerated, with restarts when E rises).
+        ``fixed_point`` of visibility and materiality, ``gradient`` descent of E, or ``fista``
+        (accelerated, with restarts when E rises).
     passes
-        Sweeps over all target points, at most.
+        Readings of all views after the start, or sweeps over all target points, at most.
     tolerance
-        Stop when a pass lowers E by less than this share; 0 = never.
+        Stop when a pass lowers E by less than this share, or, at the fixed point, changes less than
+        this share of the pixels by more than half a plane; 0 = never.
     binarization
         ``plane``: the N most material points of each epipolar plane, then the nearest on each ray
         (the paper; pixels may stay without an answer); ``ray``: argmax of mu V on each ray;
         ``volume``: semi-global over the whole map at once, with the cost of a point
         (sum V_ij (1 - rho_ij) + 0.25 hidden) / (sum V_ij + 0.25) + material (1 - mu), V_ij being the
-        product of the visibilities of the pair's views other than the reference.
-    hidden
-        The cost of a point that no pair sees.
+        product of the visibilities of the pair's views other than the reference; at the fixed point
+        that is the last reading.
     material
-        Weight of mu in the choice of planes; the fraction of a plane is fitted without it.
+        Weight of mu where planes are chosen.
     """
 
     presets: ClassVar[Mapping[str, Mapping[str, object]]] = {
@@ -98,7 +103,9 @@ class Materiality(Matching, SemiGlobal):
             "optimiser": "gradient",
             "passes": 50,
             "binarization": "plane",
-        }
+            "alike": 0.0,
+        },
+        "descent": {"views": 5, "optimiser": "fista", "passes": 5},
     }
 
     start: Start = field(default="consensus", validator=validators.in_(get_args(Start)))
@@ -109,29 +116,66 @@ class Materiality(Matching, SemiGlobal):
     across: float = field(default=10.0, validator=validators.ge(0))
     along: float = field(default=6.0, validator=validators.ge(0))
     edge: float = field(default=10.0, validator=validators.gt(0))
-    optimiser: Optimiser = field(default="fista", validator=validators.in_(get_args(Optimiser)))
-    passes: int = field(default=5, validator=validators.ge(0))
+    optimiser: Optimiser = field(default="fixed_point", validator=validators.in_(get_args(Optimiser)))
+    passes: int = field(default=1, validator=validators.ge(0))
     tolerance: float = field(default=0.0, validator=validators.ge(0))
     binarization: Binarization = field(default="volume", validator=validators.in_(get_args(Binarization)))
-    hidden: float = field(default=0.7, validator=validators.ge(0))
     material: float = field(default=0.25, validator=validators.ge(0))
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
-        """The reference view's map, the materialities, and the energies of every pass."""
-        matcher, threads, probe = Matcher.of(scene, self), context.threads, context.probe
-        space = matcher.space
+        """The reference view's map, the materialities, and what every pass came to."""
+        matcher = Matcher.of(scene, self)
+        return (
+            self._fixed_point(matcher, context) if self.optimiser == "fixed_point" else self._descent(matcher, context)
+        )
+
+    def _fixed_point(self, matcher: Matcher, context: Context) -> Estimate:
+        space, threads, probe = matcher.space, context.threads, context.probe
+        if probe.active:
+            self._tell_similarities(matcher, matcher.all(threads), probe)
+        readings, changed = 0, []
+        if self.start == "consensus":
+            maps, readings = self.first(matcher, threads), 1
+        else:
+            mu = start(matcher, matcher.all(threads), self.start == "soft", self.sharpness, threads)
+            rays = [by_ray(seen_rays(mu, space, view, threads)) for view in range(space.views)]
+            maps = np.stack([fill_from_background(found) for found in rays])
+        for number in range(self.passes):
+            before, maps = maps, self.again(matcher, maps, self.material, threads)
+            readings += 1
+            changed.append(float(np.mean(np.abs(maps - before) > 0.5)))
+            if probe.active:
+                probe.iteration(
+                    number,
+                    {"changed": changed[-1]},
+                    volume=Volume(space, consensus(space, maps, threads), matcher.indices),
+                    disparity=matcher.disparity(maps[matcher.scene.ref]),
+                )
+            if self.tolerance and changed[-1] < self.tolerance:
+                break
+        wanted = context.volume or probe.active or self.binarization != "volume"
+        solid = consensus(space, maps, threads) if wanted else None
+        found = maps[matcher.scene.ref]
+        if solid is not None and self.binarization != "volume":
+            found = self._binarize(matcher, solid, threads)
+        compared = sum(seen_from(matcher, view).ray_comparisons for view in range(space.views))
+        return Estimate(
+            disparity={self._reference(matcher): matcher.disparity(found)},
+            volume=None if solid is None else Volume(space, solid, matcher.indices),
+            history={"changed": changed},
+            work={"passes": len(changed), "pair_similarities": readings * compared},
+        )
+
+    def _descent(self, matcher: Matcher, context: Context) -> Estimate:
+        space, threads, probe = matcher.space, context.threads, context.probe
         rho = matcher.all(threads)
         if probe.active:
-            for p, (i, j) in enumerate(matcher.pairs):
-                values = rho[:, p].astype(np.float32) / np.float32(FULL)
-                probe.volume(
-                    f"similarity/{matcher.indices[i]}-{matcher.indices[j]}", Volume(space, values, matcher.indices)
-                )
+            self._tell_similarities(matcher, rho, probe)
         energy = self._energy(matcher, rho, threads)
         compared = matcher.comparisons
         if self.start == "consensus":
             compared += sum(seen_from(matcher, view).ray_comparisons for view in range(space.views))
-            mu = consensus(matcher, self, self.sharpness, threads)
+            mu = consensus(space, self.first(matcher, threads), threads)
         else:
             mu = start(matcher, rho, self.start == "soft", self.sharpness, threads)
 
@@ -141,13 +185,13 @@ class Materiality(Matching, SemiGlobal):
                 {name: value for name, value in energies.items() if name != "restart"},
                 volume=Volume(space, now, matcher.indices),
                 derivative=Volume(space, slopes.copy(), matcher.indices),
-                disparity=self._disparity(matcher, now, rho, threads),
+                disparity=matcher.disparity(self._read(matcher, now, rho, threads)),
             )
 
         descent = Descent(self.passes, self.optimiser == "fista", energy.safe_step, self.tolerance, threads)
         mu, history, passes = descent.run(energy, mu, tell if probe.active else None)
         return Estimate(
-            disparity={scene.ref: self._disparity(matcher, mu, rho, threads)},
+            disparity={self._reference(matcher): matcher.disparity(self._read(matcher, mu, rho, threads))},
             volume=Volume(space, mu, matcher.indices),
             history=history,
             work={
@@ -156,6 +200,18 @@ class Materiality(Matching, SemiGlobal):
                 "pair_similarities": compared,
             },
         )
+
+    @staticmethod
+    def _reference(matcher: Matcher) -> int:
+        """Index of the reference view in the scene that was given."""
+        return matcher.indices[matcher.scene.ref]
+
+    @staticmethod
+    def _tell_similarities(matcher: Matcher, rho: NDArray[np.uint8], probe: Probe) -> None:
+        for p, (i, j) in enumerate(matcher.pairs):
+            values = rho[:, p].astype(np.float32) / np.float32(FULL)
+            name = f"similarity/{matcher.indices[i]}-{matcher.indices[j]}"
+            probe.volume(name, Volume(matcher.space, values, matcher.indices))
 
     def _target(self, matcher: Matcher) -> float:
         """N: how many materialities one epipolar plane should hold."""
@@ -182,17 +238,20 @@ class Materiality(Matching, SemiGlobal):
             weights=weights,
         )
 
-    def _disparity(
-        self, matcher: Matcher, mu: NDArray[np.float32], rho: NDArray[np.uint8], threads: int
-    ) -> NDArray[np.float32]:
-        """(H, W) disparities of the reference view, in pixels per view step of the given scene."""
+    def _binarize(self, matcher: Matcher, mu: NDArray[np.float32], threads: int) -> NDArray[np.float32]:
+        """(H, W) planes on the reference view's rays, from the materialities alone."""
         view, space = matcher.scene.ref, matcher.space
         if self.binarization == "plane":
-            found = by_plane(mu, space, view, self._target(matcher))
-        elif self.binarization == "ray":
-            found = by_ray(seen_rays(mu, space, view, threads))
-        else:
-            cost, material = visible_cost(mu, rho, space, matcher.pairs, view, self.hidden, threads)
-            extra = np.float32(self.material) * (1 - material) if self.material else None
-            found = self.read(cost, matcher.scene.views[view], threads, extra)
-        return matcher.disparity(found)
+            return by_plane(mu, space, view, self._target(matcher))
+        return by_ray(seen_rays(mu, space, view, threads))
+
+    def _read(
+        self, matcher: Matcher, mu: NDArray[np.float32], rho: NDArray[np.uint8], threads: int
+    ) -> NDArray[np.float32]:
+        """(H, W) planes on the reference view's rays."""
+        if self.binarization != "volume":
+            return self._binarize(matcher, mu, threads)
+        view, space = matcher.scene.ref, matcher.space
+        cost, material = visible_cost(mu, rho, space, matcher.pairs, view, self.hidden, threads)
+        cost += np.float32(self.material) * (1 - material)
+        return self.read(cost, matcher.scene.views[view], threads)

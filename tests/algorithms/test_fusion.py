@@ -1,13 +1,26 @@
-"""One cost per pixel and plane against plain sorting."""
+"""One cost per pixel and plane against plain sums over pairs and windows."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from matbench.algorithms.fusion import better_half, seen_from, view_cost
+from matbench.algorithms.fusion import Fusion, better_half, seen_from, support
 from matbench.algorithms.similarity import Matcher, Matching
 from matbench.scene import Range, Scene
+
+SCENES = {
+    "n": st.integers(2, 6),
+    "height": st.sampled_from([1, 2, 4, 18]),
+    "width": st.integers(1, 6),
+    "least": st.integers(-2, 1),
+    "extent": st.integers(0, 2),
+    "fineness": st.integers(1, 3),
+    "which": st.sampled_from(["all", "consecutive", "reference"]),
+    "window": st.sampled_from([1, 3, 5]),
+    "adaptive": st.sampled_from([0.0, 40.0]),
+    "seed": st.integers(0, 99),
+}
 
 
 def random_matcher(n, height=3, width=6, least=-1.0, largest=2.0, seed=0, **settings):
@@ -25,41 +38,168 @@ def both_see(matcher):
     return np.stack([inside[i] & inside[j] for i, j in matcher.pairs])
 
 
+def supported(cost, image, radius, adaptive):
+    """sum w cost / sum w over the window within the image, w = exp(-largest colour difference / adaptive)."""
+    out = np.empty(cost.shape)
+    height, width, _ = cost.shape
+    for y, x in np.ndindex(height, width):
+        rows = slice(max(0, y - radius), y + radius + 1)
+        columns = slice(max(0, x - radius), x + radius + 1)
+        gap = np.abs(image[rows, columns].astype(float) - image[y, x]).max(axis=2)
+        weight = np.exp(-gap / adaptive)
+        out[y, x] = (weight[..., None] * cost[rows, columns]).sum(axis=(0, 1)) / weight.sum()
+    return out
+
+
+def seen(matcher, maps, view, j, k, x):
+    """Per row, V and w of view j at the point of plane k on the ray of a pixel of `view`; 0 beyond its frustum."""
+    space, q = matcher.space, matcher.space.fineness
+    if j == view:
+        return 1.0, 0.0
+    sample = x * q - (j - view) * (space.first + k)
+    if not 0 <= sample < space.samples:
+        return 0.0, 0.0
+    whole, rest = divmod(sample, q)
+    ends = maps[j, :, whole + (2 * rest > q)].astype(float)
+    shares = np.maximum(0, 1 - np.abs(np.arange(space.planes)[:, None] - ends))
+    return 1 - shares[k + 2 :].sum(axis=0), shares[k]
+
+
+def seen_cost_twin(matcher, maps, hidden, window):
+    space, view = matcher.space, matcher.scene.ref
+    rho = matcher.rays(matcher.phases(), 0, space.rows, window) / 255
+    cost, mu = np.empty((2, space.rows, space.width, space.planes))
+    for x, k in np.ndindex(cost.shape[1:]):
+        rays = [seen(matcher, maps, view, j, k, x) for j in range(space.views)]
+        total, weight = 0.5 * hidden, 0.5
+        for p, (i, j) in enumerate(matcher.pairs):
+            both = rays[i][0] * rays[j][0]
+            total, weight = total + both * (1 - rho[:, p, k, x]), weight + both
+        cost[:, x, k] = total / weight
+        others = [ray for j, ray in enumerate(rays) if j != view]
+        mu[:, x, k] = (sum(w for _, w in others) + 0.05) / (sum(v for v, _ in others) + 0.5)
+    return cost, mu
+
+
 @settings(max_examples=25, deadline=None)
 @given(
-    n=st.integers(2, 6),
-    which=st.sampled_from(["all", "consecutive", "reference"]),
-    least=st.integers(-2, 1),
-    fineness=st.integers(1, 3),
-    seed=st.integers(0, 99),
+    count=st.integers(1, 8),
+    shape=st.tuples(st.integers(1, 3), st.integers(1, 3), st.integers(1, 9)),
+    hidden=st.sampled_from([0.0, 0.72, 1.5]),
+    seed=st.integers(0, 999),
 )
-def test_cost_is_one_less_the_better_half(n, which, least, fineness, seed):
-    matcher = random_matcher(n, 3, 6, least, least + 2, seed, pairs=which, fineness=fineness)
-    space, rho, known = matcher.space, matcher.all() / 255, both_see(matcher)
-    mean = np.empty(space.shape, np.float32)
-    spans = np.stack([matcher.spans(i, j) for i, j in matcher.pairs])
-    better_half(matcher.all(), spans[..., 0].copy(), spans[..., 0] + spans[..., 1], mean)
-    expected = np.zeros(space.shape)
-    for y, k, x in np.ndindex(space.shape):
-        ranked = np.sort(rho[y, known[:, k, x], k, x])[::-1]
-        if ranked.size:
-            expected[y, k, x] = np.mean(ranked[: (ranked.size + 1) // 2])
-    np.testing.assert_allclose(mean, expected, atol=1e-6)
+def test_better_half_is_the_mean_of_the_most_similar(count, shape, hidden, seed):
+    rng = np.random.default_rng(seed)
+    rows, planes, columns = shape
+    low = rng.integers(0, columns + 1, (count, planes))
+    high = np.minimum(columns, low + rng.integers(0, columns + 1, (count, planes)))
+    here = np.arange(columns)
+    known = (low[..., None] <= here) & (here < high[..., None])
+    rho = rng.integers(0, 256, (rows, count, planes, columns), dtype=np.uint8) * known
+    cost = np.full(shape, np.nan, np.float32)
+    better_half(rho, low, high, np.float32(hidden), cost)
+    for y, k, x in np.ndindex(shape):
+        ranked = np.sort(rho[y, known[:, k, x], k, x] / 255)[::-1]
+        expected = 1 - np.mean(ranked[: (ranked.size + 1) // 2]) if ranked.size else hidden
+        assert cost[y, k, x] == pytest.approx(expected, abs=1e-6)
 
-    view = matcher.scene.ref
-    known = np.stack([space.in_view(pair[None], view)[0] for pair in known])
+
+@settings(max_examples=20, deadline=None)
+@given(**SCENES)
+def test_first_cost_is_one_less_the_better_half(
+    n, height, width, least, extent, fineness, which, window, adaptive, seed
+):
+    matcher = random_matcher(
+        n, height, width, least, least + extent, seed, pairs=which, fineness=fineness, window=window
+    )
+    space, view = matcher.space, matcher.scene.ref
+    known = np.stack([space.in_view(pair[None], view)[0] for pair in both_see(matcher)])
     rays = matcher.rays(matcher.phases(), 0, space.rows)
     assert matcher.ray_comparisons == space.rows * known.sum()
     every = np.stack([space.in_view(part, view) for part in np.moveaxis(matcher.all(), 1, 0)], axis=1)
-    inner = slice(None) if which == "reference" else slice(1, -1)  # windows end where the reference does
+    # windows end where the reference does
+    inner = slice(None) if which == "reference" else slice(window // 2, max(window // 2, space.width - window // 2))
     np.testing.assert_array_equal(rays[..., inner], every[..., inner])
-    best = np.full((space.rows, space.width, space.planes), np.nan)
-    for y, x, k in np.ndindex(best.shape):
+
+    if adaptive:
+        rays = matcher.rays(matcher.phases(), 0, space.rows, 1)
+    expected = np.full((space.rows, space.width, space.planes), 0.6)
+    for y, x, k in np.ndindex(expected.shape):
         ranked = np.sort(rays[y, known[:, k, x], k, x] / 255)[::-1]
         if ranked.size:
-            best[y, x, k] = 1 - np.mean(ranked[: (ranked.size + 1) // 2])
-    for threads in (1, 2):
-        np.testing.assert_allclose(view_cost(matcher, threads), best, atol=1e-6)
+            expected[y, x, k] = 1 - np.mean(ranked[: (ranked.size + 1) // 2])
+    if adaptive:
+        expected = supported(expected, matcher.scene.views[view], window // 2, adaptive)
+    one, two = (Fusion(adaptive=adaptive, hidden=0.6).first_cost(matcher, threads) for threads in (1, 2))
+    np.testing.assert_allclose(one, expected, atol=2e-6)
+    np.testing.assert_array_equal(two, one)
+
+
+@settings(max_examples=20, deadline=None)
+@given(**SCENES)
+def test_seen_cost_is_its_equation(n, height, width, least, extent, fineness, which, window, adaptive, seed):
+    matcher = random_matcher(
+        n, height, width, least, least + extent, seed, pairs=which, fineness=fineness, window=window
+    )
+    view = seed % n
+    matcher = seen_from(matcher, view)
+    space, rng = matcher.space, np.random.default_rng(seed)
+    maps = (rng.random((n, space.rows, space.width)) * (space.planes - 1)).astype(np.float32)
+    maps = np.where(rng.random(maps.shape) < 0.3, np.rint(maps), maps)
+    cost, mu = seen_cost_twin(matcher, maps, 0.6, 1 if adaptive else window)
+    if adaptive:
+        cost = supported(cost, matcher.scene.views[view], window // 2, adaptive)
+    fusion = Fusion(adaptive=adaptive, hidden=0.6)
+    one, two = (fusion.seen_cost(matcher, maps, threads) for threads in (1, 2))
+    np.testing.assert_allclose(one[0], cost, atol=5e-6)
+    np.testing.assert_allclose(one[1], mu, atol=2e-6)
+    assert 0 < one[1].min() <= one[1].max() < 1
+    for first, second in zip(one, two, strict=True):
+        np.testing.assert_array_equal(second, first)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    shape=st.tuples(st.integers(1, 6), st.integers(1, 6), st.integers(1, 4)),
+    radius=st.integers(0, 2),
+    adaptive=st.sampled_from([2.0, 30.0, 1e6]),
+    seed=st.integers(0, 999),
+)
+def test_support_is_a_weighted_mean_of_the_window(shape, radius, adaptive, seed):
+    rng = np.random.default_rng(seed)
+    cost, image = rng.random(shape, np.float32), rng.integers(0, 256, (*shape[:2], 3), dtype=np.uint8)
+    fall = np.exp(-np.arange(256) / adaptive).astype(np.float32)
+    expected = supported(cost, image, radius, adaptive)
+    first = int(rng.integers(shape[0]))
+    end = int(rng.integers(first, shape[0])) + 1
+    top, bottom = max(0, first - radius), min(shape[0], end + radius)
+    out = np.full((end - first, *shape[1:]), np.nan, np.float32)
+    support(cost[top:bottom].copy(), image, first, first - top, fall, radius, out)
+    np.testing.assert_allclose(out, expected[first:end], atol=1e-6)
+
+
+def test_support_stays_on_its_side_of_an_edge():
+    image = np.zeros((5, 8, 3), np.uint8)
+    image[:, 4:, 1] = 200
+    cost = np.broadcast_to((np.arange(8) >= 4)[:, None], (5, 8, 1)).astype(np.float32)
+    fall = np.exp(-np.arange(256) / 10).astype(np.float32)
+    out = np.empty_like(cost)
+    support(cost, image, 0, 0, fall, 2, out)
+    np.testing.assert_allclose(out, cost, atol=1e-6)
+
+
+def test_a_view_that_ends_before_a_point_says_nothing_about_it():
+    matcher = random_matcher(3, 2, 9, 0, 4, pairs="reference", fineness=1, window=1)
+    fusion = Fusion(adaptive=0, hidden=0.4)
+    far = np.zeros((3, 2, 9), np.float32)
+    near = far + 4
+    cost, mu = fusion.seen_cost(matcher, near)
+    # two planes behind and farther nothing is seen, at the next everything
+    np.testing.assert_allclose(cost[..., :3], 0.4, atol=1e-6)
+    np.testing.assert_allclose(mu[..., :3], 0.1, atol=1e-6)
+    assert mu[:, 4, 4] == pytest.approx((2 + 0.05) / (2 + 0.5))
+    assert mu[:, 4, 3] == pytest.approx(0.05 / 2.5)
+    np.testing.assert_array_equal(cost[:, 4, 3:], fusion.seen_cost(matcher, far)[0][:, 4, 3:])
 
 
 @pytest.mark.parametrize("view", [0, 3])
@@ -68,3 +208,9 @@ def test_seen_from_another_view_that_view_is_in_every_pair(view):
     assert matcher.scene.ref == view
     assert len(matcher.pairs) == 3
     assert (matcher.pairs == view).any(axis=1).all()
+
+
+@pytest.mark.parametrize("name", ["adaptive", "hidden"])
+def test_a_wrong_value_names_the_parameter(name):
+    with pytest.raises(ValueError, match=name):
+        Fusion(**{name: -1.0})

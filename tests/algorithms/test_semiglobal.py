@@ -32,7 +32,7 @@ def twin(cost, image, small, large, edge):
     return total
 
 
-def twin_winner(total, cost, fit):
+def twin_winner(total, cost):
     found = np.full(total.shape[:2], np.nan)
     for y, x in np.ndindex(found.shape):
         known = ~np.isnan(cost[y, x])
@@ -41,7 +41,7 @@ def twin_winner(total, cost, fit):
         k = int(np.argmin(np.where(known, total[y, x], np.inf)))
         found[y, x] = k
         if 0 < k < total.shape[2] - 1 and known[k - 1] and known[k + 1]:
-            below, here, above = fit[y, x, k - 1 : k + 2].astype(float)
+            below, here, above = total[y, x, k - 1 : k + 2].astype(float)
             if here <= min(below, above) and max(below, above) > here:
                 found[y, x] += (below - above) / (2 * (max(below, above) - here))
     return found
@@ -63,8 +63,10 @@ def test_aggregation_and_winner_are_their_twins(problem, steps):
     total = aggregate(cost, image, *steps, 25.0)
     expected = twin(cost, image, *steps, 25.0)
     np.testing.assert_allclose(total, expected, rtol=2e-5, atol=2e-5)
-    fit = np.roll(total, 1, axis=0)
-    np.testing.assert_allclose(winner(total, cost, fit), twin_winner(total, cost, fit), atol=1e-3)
+    np.testing.assert_allclose(winner(total, cost), twin_winner(total, cost), atol=1e-3)
+    # the least of other totals may lie beside a lesser one that is unknown
+    other = np.roll(total, 1, axis=2)
+    np.testing.assert_allclose(winner(other, cost), twin_winner(other, cost), atol=1e-3)
 
 
 def test_threads_change_nothing():
@@ -83,15 +85,12 @@ def test_unknown_pixels_answer_nothing_and_pass_messages_on():
     np.testing.assert_array_equal(found[:, [0, 3, 5, 8]], 2)
 
 
-def test_fit_lies_between_planes_and_ignores_the_extra_cost():
+def test_fit_lies_between_planes():
     planes = np.arange(9, dtype=np.float32)
     cost = np.broadcast_to(np.abs(planes - 4.3), (4, 4, 9)).astype(np.float32)
-    extra = np.broadcast_to(np.where(planes == 4, 0, 1), cost.shape).astype(np.float32)
     image = np.zeros((4, 4, 3), np.uint8)
-    found = SemiGlobal().read(cost, image, extra=extra)
     # neighbours pull a little towards the plane they agree on
-    np.testing.assert_allclose(found, 4.3, atol=0.1)
-    np.testing.assert_array_equal(found, SemiGlobal().read(cost, image))
+    np.testing.assert_allclose(SemiGlobal().read(cost, image), 4.3, atol=0.1)
     np.testing.assert_allclose(SemiGlobal(small_step=0, large_step=0).read(cost, image), 4.3, atol=1e-3)
 
 

@@ -1,0 +1,146 @@
+"""Maps of several views that contradict one another, mended from trusted neighbours of the same colour."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from matbench.algorithms.holes import fill_from_background
+from matbench.algorithms.kernels import kernel
+from matbench.algorithms.parallel import over_rows
+
+TRUST = 4  # views that must agree with a pixel for each that contradicts it
+REACH = 9  # pixels to either side in which neighbours are asked
+COLOUR, DISTANCE = 8.0, 9.0  # grey levels and pixels over which their votes fall to 1/e
+
+
+@kernel
+def count_votes(maps, view, tolerance, top, end, agreeing, contradicting):  # type: ignore[no-untyped-def]
+    """How many other views agree with each pixel of a view, and how many contradict it.
+
+    A view j agrees if its disparity, where it should see the point, is the same within `tolerance`;
+    it contradicts if it sees farther, through the point. A view that sees nearer says nothing.
+
+    Parameters
+    ----------
+    maps
+        (views, H, W) float32 pixels per view step, NaN = no answer.
+    agreeing, contradicting
+        (H, W) int32, of which the rows top..end are overwritten.
+    """
+    views, _, width = maps.shape
+    for y in range(top, end):
+        for x in range(width):
+            here = maps[view, y, x]
+            agreed, contradicted = 0, 0
+            if here == here:
+                for j in range(views):
+                    at = np.int64(np.floor(x - (j - view) * here + np.float32(0.5)))
+                    if j != view and 0 <= at < width:
+                        gap = maps[j, y, at] - here
+                        if abs(gap) <= tolerance:
+                            agreed += 1
+                        elif gap < -tolerance:
+                            contradicted += 1
+            agreeing[y, x] = agreed
+            contradicting[y, x] = contradicted
+
+
+@kernel
+def vote(found, image, asked, trusted, colour, distance, least, step, top, end, out):  # type: ignore[no-untyped-def]
+    """Weighted median of the trusted neighbours of every pixel that is asked about.
+
+    Neighbours weigh exp(-|dI| / COLOUR - (|dx| + |dy|) / DISTANCE), with |dI| the largest difference
+    over the colours. The median is that of classes `step` wide from `least` on, and no more than
+    what was found; a pixel that is within a class of it, or without trusted neighbours, keeps its own.
+
+    Parameters
+    ----------
+    found
+        (H, W) float32 disparities, NaN = none.
+    image
+        (H, W, 3) uint8.
+    asked, trusted
+        (H, W) bool.
+    colour, distance
+        (256,) and (REACH + 1,) float32 factors of the weight.
+    """
+    height, width = found.shape
+    reach = distance.size - 1
+    most = np.nanmax(found)
+    votes = np.empty(np.int64((most - least) / step) + 1, np.float32)
+    for y in range(top, end):
+        for x in range(width):
+            out[y, x] = found[y, x]
+            if not asked[y, x]:
+                continue
+            votes[:] = 0
+            total = np.float32(0)
+            for v in range(max(0, y - reach), min(height, y + reach + 1)):
+                for u in range(max(0, x - reach), min(width, x + reach + 1)):
+                    if trusted[v, u]:
+                        gap = np.int64(0)
+                        for c in range(3):
+                            gap = max(gap, abs(np.int64(image[y, x, c]) - np.int64(image[v, u, c])))
+                        weight = colour[gap] * distance[abs(v - y)] * distance[abs(u - x)]
+                        votes[np.int64((found[v, u] - least) / step)] += weight
+                        total += weight
+            if total > 0:
+                place, passed = 0, votes[0]
+                while passed < total / 2 and place < votes.size - 1:
+                    place += 1
+                    passed += votes[place]
+                median = min(least + (place + np.float32(0.5)) * step, most)
+                if not abs(found[y, x] - median) <= step:
+                    out[y, x] = median
+
+
+def mend(
+    maps: NDArray[np.float32], images: NDArray[np.uint8], pixel: float, rounds: int, threads: int = 1
+) -> NDArray[np.float32]:
+    """(views, H, W) maps that agree better with one another, without NaN but for a view that is all NaN.
+
+    In every round, for every view: a pixel is doubtful if it has less than TRUST times as many views
+    that agree with it as contradict it (`count_votes`), or no answer; in the first round it loses its answer
+    where fewer agree than contradict. Doubtful pixels take the weighted median of their trusted
+    neighbours (`vote`), and holes without any are filled from the background. A view without
+    any trusted pixel is left as it is.
+
+    Parameters
+    ----------
+    maps
+        (views, H, W) float32, pixels per view step; NaN = no answer. Left untouched.
+    images
+        (views, H, W, 3) uint8.
+    pixel
+        One pixel of the field's pair, in pixels per view step: what maps may differ by.
+    rounds
+        How often; 0 only fills holes.
+    """
+    colour = np.exp(np.arange(256) / -COLOUR).astype(np.float32)
+    distance = np.exp(np.arange(REACH + 1) / -DISTANCE).astype(np.float32)
+    shape = maps.shape[1:]
+    for number in range(rounds):
+        new = np.empty_like(maps)
+        for view, image in enumerate(images):
+            agreeing, contradicting = np.empty(shape, np.int32), np.empty(shape, np.int32)
+
+            def count(top: int, end: int, view: int = view, maps: NDArray[np.float32] = maps) -> None:
+                count_votes(maps, view, np.float32(pixel), top, end, agreeing, contradicting)  # noqa: B023
+
+            over_rows(count, shape[0], threads, 64)
+            found = maps[view].copy()
+            if number == 0:
+                found[contradicting > agreeing] = np.nan
+            trusted = (contradicting * TRUST <= agreeing) & ~np.isnan(found)
+            if not trusted.any():
+                new[view] = maps[view]
+                continue
+
+            def ask(top: int, end: int, view: int = view) -> None:
+                vote(
+                    found, image, ~trusted, trusted, colour, distance,  # noqa: B023
+                    np.float32(np.nanmin(found)), np.float32(pixel / 2), top, end, new[view],  # noqa: B023
+                )  # fmt: skip
+
+            over_rows(ask, shape[0], threads)
+        maps = np.stack([fill_from_background(found) for found in new])
+    return maps if rounds else np.stack([fill_from_background(found) for found in maps])

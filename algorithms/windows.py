@@ -1,0 +1,217 @@
+"""Similarities of windows in one pair of views (SPEC 1), plane by plane and row by row.
+
+Rows of a view are (phases, channels, H, samples) colours, (phases, H, samples) gradients and census; what
+is compared at a point is sample `x + ui` of one view with sample `x + uj` of the other. Offsets are
+unsigned: signed ones might count from an array's end, which keeps loops from being vectorised.
+"""
+
+import numpy as np
+
+from matbench.algorithms.features import CENSUS_BITS
+from matbench.algorithms.kernels import fill, helper, kernel, popcount
+
+FULL = 255  # a stored similarity of 1: similarities are kept in one byte
+COLOUR, SLOPE, ORDER = 0.35, 0.25, 0.40  # weights of the three costs of ``mixed``
+COLOUR_SPAN, SLOPE_SPAN, ORDER_SPAN = 20.0, 10.0, 20.0  # differences that cost the whole weight
+SQUARES, CENSUS, MIXED = range(3)  # what is averaged over a window
+EXPONENTIAL, ROOT, LINEAR = range(3)  # how the mean becomes a similarity
+TILE = 4  # planes
+
+
+@helper
+def _square_difference(left, right, fi, ui, fj, uj, row, channels, limit, out):  # type: ignore[no-untyped-def]
+    """out = min(mean over the channels of (a - b)^2, limit); the tuple `channels` is as long as there are."""
+    share, zero = np.float32(1 / len(channels)), np.float32(0)
+    for x in range(np.uintp(out.size)):
+        total = zero
+        for c in range(len(channels)):
+            gap = left[fi, c, row, x + np.uintp(ui)] - right[fj, c, row, x + np.uintp(uj)]
+            total += gap * gap
+        out[x] = min(total * share, limit)
+
+
+@helper
+def _differing(a, b):  # type: ignore[no-untyped-def]
+    """How many of the 48 bits of two census words differ."""
+    return np.float32(np.int32(popcount(a ^ b)))
+
+
+@helper
+def _differing_among(a, b, alike):  # type: ignore[no-untyped-def]
+    """How many of 48 bits would differ, were all as those that are set in `alike`."""
+    return (
+        np.float32(CENSUS_BITS)
+        * np.float32(np.int32(popcount((a ^ b) & alike)))
+        / np.float32(np.int32(popcount(alike)))
+    )
+
+
+@helper
+def _census_difference(left, right, left_alike, right_alike, fi, ui, fj, uj, row, masked, out):  # type: ignore[no-untyped-def]
+    """out = min(h, 20) / 20, with h how many bits differ."""
+    share, most = np.float32(1 / ORDER_SPAN), np.float32(ORDER_SPAN)
+    for x in range(np.uintp(out.size)):
+        i, j = x + np.uintp(ui), x + np.uintp(uj)
+        if len(masked) > 0:
+            differ = _differing_among(
+                left[fi, row, i], right[fj, row, j], left_alike[fi, row, i] & right_alike[fj, row, j]
+            )
+        else:
+            differ = _differing(left[fi, row, i], right[fj, row, j])
+        out[x] = share * min(differ, most)
+
+
+@helper
+def _mixed_difference(  # type: ignore[no-untyped-def]
+    left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike,
+    fi, ui, fj, uj, row, masked, channels, limit, out,
+):  # fmt: skip
+    """out = the cost of ``mixed`` at every pixel, between 0 and 1 unless `limit` allows more."""
+    colour, slope = np.float32(COLOUR / COLOUR_SPAN / len(channels)), np.float32(SLOPE / SLOPE_SPAN)
+    order, steepest = np.float32(ORDER / ORDER_SPAN), np.float32(SLOPE_SPAN)
+    most, zero = np.float32(ORDER_SPAN), np.float32(0)
+    for x in range(np.uintp(out.size)):
+        i, j = x + np.uintp(ui), x + np.uintp(uj)
+        total = zero
+        for c in range(len(channels)):
+            total += abs(left[fi, c, row, i] - right[fj, c, row, j])
+        steep = abs(left_slope[fi, row, i] - right_slope[fj, row, j])
+        if len(masked) > 0:
+            differ = _differing_among(
+                left_bits[fi, row, i], right_bits[fj, row, j], left_alike[fi, row, i] & right_alike[fj, row, j]
+            )
+        else:
+            differ = _differing(left_bits[fi, row, i], right_bits[fj, row, j])
+        out[x] = colour * min(total, limit) + slope * min(steep, steepest) + order * min(differ, most)
+
+
+@helper
+def _sum_rows(ring, taps, out):  # type: ignore[no-untyped-def]
+    """out = sum of all rows of `ring`; the tuple `taps` is as long as they are many."""
+    zero = np.float32(0)
+    for x in range(np.uintp(out.size)):
+        total = zero
+        for row in range(len(taps)):
+            total += ring[row, x]
+        out[x] = total
+
+
+@helper
+def _exponential(column, taps, apart, weight, share, rate, root, out):  # type: ignore[no-untyped-def]
+    """exp(-rate mean) in 255ths, or exp(-rate sqrt(mean)) with `root`; the mean is that of `_complement`.
+
+    exp(-z) = p(z / 16)^16 with p the Taylor polynomial of exp(-w) of degree 4: right within a
+    thousandth of a 255th. Beyond z = 6.4 the result is below half a 255th.
+    """
+    zero, most, one = np.float32(0), np.float32(0.4), np.float32(1)
+    half, full, sixteenth = np.float32(0.5), np.float32(FULL), np.float32(rate / 16)
+    a2, a3, a4 = np.float32(1 / 2), np.float32(-1 / 6), np.float32(1 / 24)
+    for x in range(np.uintp(out.size)):
+        total = zero
+        for tap in range(len(taps)):
+            total += column[x + np.uintp(tap * apart)]
+        mean = total * (weight[x] * share)
+        w = min(sixteenth * (np.sqrt(mean) if root else mean), most)
+        power = one + w * (w * (a2 + w * (a3 + w * a4)) - one)
+        power *= power
+        power *= power
+        power *= power
+        out[x] = np.uint8(np.int32(full * power * power + half))
+
+
+@helper
+def _complement(column, taps, apart, weight, share, rate, out):  # type: ignore[no-untyped-def]
+    """1 - rate mean in 255ths; the mean is share weight times the sum over taps `apart` columns from one another."""
+    zero, half, full, fall = np.float32(0), np.float32(0.5), np.float32(FULL), np.float32(FULL * rate)
+    for x in range(np.uintp(out.size)):
+        total = zero
+        for tap in range(len(taps)):
+            total += column[x + np.uintp(tap * apart)]
+        out[x] = np.uint8(np.int32(max(full - fall * (total * (weight[x] * share)), zero) + half))
+
+
+@helper
+def _tap_shares(fineness, radius, width, weight):  # type: ignore[no-untyped-def]
+    """weight = 1 over how many columns of a window lie within a row of `width` samples."""
+    most = np.float32(1 / (2 * radius + 1))
+    for x in range(width):
+        weight[x] = most
+    for edge in range(min(radius * fineness, width)):
+        for x in (edge, width - 1 - edge):
+            taps = min(radius, x // fineness) + min(radius, (width - 1 - x) // fineness) + 1
+            weight[x] = np.float32(1 / taps)
+
+
+@kernel
+def pair_rows(  # type: ignore[no-untyped-def]
+    left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike, measure, shape, rate, limit,
+    masked, channels, taps, spans, fineness, y0, p, out,
+):  # fmt: skip
+    """Similarities of pair p for the rows y0, y0 + 1, ... of `out` (rows, pairs, planes, columns).
+
+    Differences of a row are computed once and kept while windows of the plane need them; taps that
+    leave a frame of either view are left out of the mean.
+
+    Parameters
+    ----------
+    measure, shape
+        Which differences are averaged, and how their mean becomes a similarity.
+    rate
+        Of the exponential, or of the linear fall.
+    limit
+        The most that the colours of a pixel may differ: of mean squares, or of the sum of absolutes.
+    masked
+        A tuple, empty to compare all bits of the census; else only those set in both `alike`.
+    channels, taps
+        Tuples as long as there are channels, and taps along a side of the window: the compiler counts them.
+    spans
+        (planes, 6) first column in `out` and number of columns, then phase and sample where they
+        start in either view.
+    fineness
+        Samples from tap to tap.
+    """
+    height, samples = left.shape[2], left.shape[3]
+    side = len(taps)
+    radius = side // 2
+    reach = radius * fineness
+    # planes are taken a few at a time: their windows' rows stay near, and `out` is written in long runs
+    ring = np.zeros((TILE, side, samples), np.float32)
+    weights = np.empty((TILE, samples), np.float32)
+    column = np.zeros(samples + 2 * reach, np.float32)
+    zero = np.float32(0)
+    for nearest in range(TILE, out.shape[2] + TILE, TILE):
+        tile = range(nearest - TILE, min(nearest, out.shape[2]))
+        for k in tile:
+            _tap_shares(fineness, radius, spans[k, 1], weights[k % TILE])
+        for row in range(y0 - radius, y0 + out.shape[0] + radius):
+            y = row - radius
+            share = np.float32(1 / (min(height, y + radius + 1) - max(0, y - radius))) if y >= y0 else zero
+            for k in tile:
+                low, width = spans[k, 0], spans[k, 1]
+                fi, ui, fj, uj = spans[k, 2], spans[k, 3], spans[k, 4], spans[k, 5]
+                if width <= 0:
+                    continue
+                near = ring[k % TILE]
+                cost = near[row % side, :width]
+                if row < 0 or row >= height:
+                    fill(zero, cost)
+                elif measure == SQUARES:
+                    _square_difference(left, right, fi, ui, fj, uj, row, channels, limit, cost)
+                elif measure == CENSUS:
+                    _census_difference(
+                        left_bits, right_bits, left_alike, right_alike, fi, ui, fj, uj, row, masked, cost
+                    )
+                else:
+                    _mixed_difference(
+                        left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike,
+                        fi, ui, fj, uj, row, masked, channels, limit, cost,
+                    )  # fmt: skip
+                if y < y0:
+                    continue
+                _sum_rows(near, taps, column[reach : reach + width])
+                fill(zero, column[reach + width : 2 * reach + width])
+                similar = out[y - y0, p, k, low : low + width]
+                if shape == LINEAR:
+                    _complement(column, taps, fineness, weights[k % TILE], share, rate, similar)
+                else:
+                    _exponential(column, taps, fineness, weights[k % TILE], share, rate, shape == ROOT, similar)
