@@ -147,20 +147,20 @@ def _solve(
     context = Context(job.cell.seed, job.threads)
     start = time.perf_counter()
     try:
-        method.solve(tiny(scene), context)
+        warm = method.solve(tiny(scene), context)
     except Exception:  # too small for this method, which nobody asked it to solve
-        method.solve(scene, context)
+        warm = method.solve(scene, context)
     warmed = time.perf_counter()
     _reset_peak()
     begin = time.perf_counter()
-    estimate = method.solve(scene, context)
+    estimate = method.solve(scene, evolve(context, volume=job.volumes))
     seconds = time.perf_counter() - begin
     peak = _peak_mb()
     maps = checked(estimate, scene)
     history = {name: [v if isfinite(v) else None for v in map(float, vs)] for name, vs in estimate.history.items()}
     work = {name: int(count) for name, count in estimate.work.items()}
     volume = _volume(estimate, scene) if job.volumes else None
-    has_volume = volume is not None if job.volumes else estimate.volume is not None
+    has_volume = volume is not None if job.volumes else getattr(warm, "volume", None) is not None
     return Outcome("ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history), maps, volume
 
 
