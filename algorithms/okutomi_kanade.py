@@ -3,12 +3,12 @@
 import numpy as np
 from attrs import field, frozen, validators
 from numba import njit
-from numpy.typing import NDArray
 
 from matbench.algorithm import Context, Estimate
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd
-from matbench.algorithms.sampling import fine_rows, search_space
+from matbench.algorithms.sampling import by_phase, fine_rows, search_space
+from matbench.algorithms.windows import square_difference
 from matbench.scene import Scene
 
 BLOCK_ROWS = 32  # rows that one task works on: its arrays stay in the second-level cache
@@ -19,7 +19,7 @@ class OkutomiKanade:
     """For each pixel of the reference view the disparity that minimises the SSSD (SPEC 7).
 
     SSSD(x, d) = mean over views j != ref of
-    sum over w in W of |I_ref(x + w) - I_j(x + w - (j - ref) * d)|^2, colours summed.
+    sum over w in W of |I_ref(x + w) - I_j(x + w - (j - ref) * d)|^2, mean over the colours.
 
     A term whose window leaves image j is left out of the mean; the window itself ends where the
     reference image does. Of equal minima the farthest plane wins; a parabola through the minimum
@@ -53,7 +53,7 @@ class OkutomiKanade:
 
         def solve_rows(first: int, end: int) -> None:
             top, bottom = max(0, first - radius), min(space.rows, end + radius)
-            phases = pixel_phases(fine_rows(chosen.views[:, top:bottom], space.fineness), space.fineness)
+            phases = by_phase(fine_rows(chosen.views[:, top:bottom], space.fineness), space.fineness)
             disparity[first:end], count = sssd_minimum(
                 phases, chosen.ref, space.first, space.planes, radius, first - top, end - first
             )
@@ -62,38 +62,6 @@ class OkutomiKanade:
         over_rows(solve_rows, space.rows, context.threads, BLOCK_ROWS)
         disparity /= np.float32(space.fineness * (kept[1] - kept[0]))
         return Estimate({scene.ref: disparity}, work={"ssd_evaluations": sum(evaluations)})
-
-
-def pixel_phases(fine: NDArray[np.float32], fineness: int) -> NDArray[np.float32]:
-    """Sort finely sampled rows by their phase within a pixel, so that shifted reads are contiguous.
-
-    Parameters
-    ----------
-    fine
-        (n, 3, H, q * (W - 1) + 1), as from `fine_rows`.
-    fineness
-        q.
-
-    Returns
-    -------
-    (n, q, 3, H, W) float32: sample ``q * x + phase`` of a row at ``[phase, ..., x]``; 0 where that
-    lies beyond the last pixel.
-    """
-    views, colours, rows, samples = fine.shape
-    width = (samples - 1) // fineness + 1
-    phases = np.zeros((views, fineness, colours, rows, width), np.float32)
-    for phase in range(fineness):
-        values = fine[..., phase::fineness]
-        phases[:, phase, ..., : values.shape[3]] = values
-    return phases
-
-
-@njit(nogil=True, cache=True)
-def _squares(red, green, blue, red_other, green_other, blue_other, out):  # type: ignore[no-untyped-def]
-    """out[x] <- sum over colours of their squared differences, all (X,)."""
-    for x in range(out.size):
-        r, g, b = red[x] - red_other[x], green[x] - green_other[x], blue[x] - blue_other[x]
-        out[x] = r * r + g * g + b * b
 
 
 @njit(nogil=True, cache=True)
@@ -138,7 +106,7 @@ def sssd_minimum(phases, ref, first, planes, radius, top, rows):  # type: ignore
     Parameters
     ----------
     phases
-        (n, q, 3, R, W) float32, see `pixel_phases`: the block's rows and those its windows reach.
+        (n, q, 3, R, W) float32, see `by_phase`: the block's rows and those its windows reach.
     ref
         Index of the reference view.
     first, planes
@@ -179,17 +147,11 @@ def sssd_minimum(phases, ref, first, planes, radius, top, rows):  # type: ignore
             right = end if end == width else end - radius
             if view == ref or left >= right:
                 continue
-            here, there = phases[ref, 0], phases[view, phase]
             for y in range(height):
-                _squares(
-                    here[0, y, seen:end],
-                    here[1, y, seen:end],
-                    here[2, y, seen:end],
-                    there[0, y, seen + whole : end + whole],
-                    there[1, y, seen + whole : end + whole],
-                    there[2, y, seen + whole : end + whole],
+                square_difference(
+                    phases[ref], phases[view], 0, seen, phase, seen + whole, y, (0, 0, 0), np.float32(np.inf),
                     squares[y, seen:end],
-                )
+                )  # fmt: skip
             for y in range(rows):
                 inside = column[radius + seen : radius + end]
                 inside[:] = 0

@@ -46,6 +46,29 @@ def fine_rows(images: NDArray[np.uint8], fineness: int) -> NDArray[np.float32]:
     return fine
 
 
+def by_phase(values: NDArray[np.generic], fineness: int) -> NDArray[np.generic]:
+    """Sort finely sampled rows by their phase within a pixel, so that shifted reads are contiguous.
+
+    Parameters
+    ----------
+    values
+        (n, ..., q * (W - 1) + 1), such as from `fine_rows`.
+    fineness
+        q.
+
+    Returns
+    -------
+    (n, q, ..., W): sample ``q * x + phase`` of a row at ``[:, phase, ..., x]``; 0 where that lies
+    beyond the last pixel.
+    """
+    width = (values.shape[-1] - 1) // fineness + 1
+    out = np.zeros((values.shape[0], fineness, *values.shape[1:-1], width), values.dtype)
+    for phase in range(fineness):
+        part = values[..., phase::fineness]
+        out[:, phase, ..., : part.shape[-1]] = part
+    return out
+
+
 def search_space(scene: Scene, fineness: int = 0) -> DisparitySpace:
     """The disparity space that covers a scene's range.
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from matbench.algorithms.features import alike, census, gradient, luma
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd
-from matbench.algorithms.sampling import fine_rows, search_space
+from matbench.algorithms.sampling import by_phase, fine_rows, search_space
 from matbench.algorithms.windows import CENSUS, EXPONENTIAL, LINEAR, MIXED, ROOT, SQUARES, pair_rows
 from matbench.algorithms.windows import FULL as FULL
 from matbench.scene import Scene
@@ -20,16 +20,6 @@ PairSet = Literal["all", "consecutive", "reference"]
 Form = Literal["ssd", "rms", "linear", "census", "mixed"]
 # (views, phases, channels, H, samples) colours or luma, (views, phases, H, samples) gradients, census, alike pixels
 Features = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint64], NDArray[np.uint64]]
-
-
-def _by_phase(values: NDArray[np.generic], fineness: int) -> NDArray[np.generic]:
-    """(views, ..., samples) as (views, phases, ..., width); 0 beyond the last sample."""
-    width = (values.shape[-1] - 1) // fineness + 1
-    out = np.zeros((values.shape[0], fineness, *values.shape[1:-1], width), values.dtype)
-    for phase in range(fineness):
-        part = values[..., phase::fineness]
-        out[:, phase, ..., : part.shape[-1]] = part
-    return out
 
 
 def pairs(views: int, which: PairSet, ref: int = 0) -> NDArray[np.int64]:
@@ -214,7 +204,7 @@ class Matcher:
 
     def phases(self) -> Features:
         """The rows sorted by their phase within a pixel, so that every q-th sample is read contiguously."""
-        return tuple(_by_phase(part, self.space.fineness) for part in (self.rows, self.slopes, self.bits, self.alike))  # type: ignore[return-value]
+        return tuple(by_phase(part, self.space.fineness) for part in (self.rows, self.slopes, self.bits, self.alike))  # type: ignore[return-value]
 
     def _fill(self, first: int, out: NDArray[np.uint8]) -> None:
         whole = self.rows[:, None], self.slopes[:, None], self.bits[:, None], self.alike[:, None]

@@ -19,7 +19,7 @@ TILE = 4  # planes
 
 
 @helper
-def _square_difference(left, right, fi, ui, fj, uj, row, channels, limit, out):  # type: ignore[no-untyped-def]
+def square_difference(left, right, fi, ui, fj, uj, row, channels, limit, out):  # type: ignore[no-untyped-def]
     """out = min(mean over the channels of (a - b)^2, limit); the tuple `channels` is as long as there are."""
     share, zero = np.float32(1 / len(channels)), np.float32(0)
     for x in range(np.uintp(out.size)):
@@ -196,7 +196,7 @@ def pair_rows(  # type: ignore[no-untyped-def]
                 if row < 0 or row >= height:
                     fill(zero, cost)
                 elif measure == SQUARES:
-                    _square_difference(left, right, fi, ui, fj, uj, row, channels, limit, cost)
+                    square_difference(left, right, fi, ui, fj, uj, row, channels, limit, cost)
                 elif measure == CENSUS:
                     _census_difference(
                         left_bits, right_bits, left_alike, right_alike, fi, ui, fj, uj, row, masked, cost
