@@ -139,7 +139,8 @@ class Materiality(Matching, Readings):
         else:
             mu = start(matcher, matcher.all(threads), self.start == "soft", self.sharpness, threads)
             rays = [by_ray(seen_rays(mu, space, view, threads)) for view in range(space.views)]
-            maps = np.stack([fill_from_background(found) for found in rays])
+            # a view in which nothing is material ends in the farthest plane
+            maps = np.nan_to_num(np.stack([fill_from_background(found) for found in rays]))
         for number in range(self.passes):
             before, maps = maps, self.again(matcher, maps, self.material, threads)
             readings += 1

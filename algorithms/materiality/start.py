@@ -51,7 +51,7 @@ def soften(mean, views, first, origin, samples, sharpness):  # type: ignore[no-u
     along = np.empty((views, samples), np.float32)
     share = np.empty((planes, columns), np.float32)
     seeing = np.zeros((planes, columns), np.float32)
-    one = np.float32(1)
+    one, least = np.float32(1), np.float32(1e-30)  # nothing similar along a ray leaves it empty
     for i in range(views):
         for k in range(planes):
             start = i * (first + k) - origin
@@ -72,7 +72,7 @@ def soften(mean, views, first, origin, samples, sharpness):  # type: ignore[no-u
             for k in range(planes):
                 start = i * (first + k) - origin
                 for u in range(samples):
-                    share[k, start + u] += one / along[i, u]
+                    share[k, start + u] += one / max(along[i, u], least)
         for k in range(planes):
             for x in range(columns):
                 mean[y, k, x] *= share[k, x] / max(seeing[k, x], one)

@@ -95,6 +95,7 @@ def test_any_size_is_answered_within_the_range(method, n, height, width, wall, b
         found = method.solve(scene, Context(threads=2)).disparity[1]
         assert found.shape == (height, width)
         answered = found[~np.isnan(found)]
+        assert answered.size == found.size or getattr(method, "binarization", "volume") in ("plane", "ray")
         assert (answered >= scene.disparities.least - 1e-4).all()
         assert (answered <= scene.disparities.largest + 1e-4).all()
 
@@ -108,6 +109,19 @@ def test_constant_images_are_answered_without_a_warning(method, level):
     assert not np.isinf(estimate.disparity[1]).any()
     if estimate.volume is not None:
         assert np.isfinite(estimate.volume.values).all()
+
+
+@pytest.mark.parametrize("start", ["mean", "soft", "consensus"])
+@pytest.mark.parametrize("method", [Materiality(), FISTA], ids=["fixed_point", "fista"])
+def test_views_without_any_likeness_are_answered_without_a_warning(method, start):
+    views = np.zeros((3, 8, 12, 3), np.uint8)
+    views[1] = 255
+    scene = Scene("black and white", views, ("0", "1", "2"), 1, Range(0, 3), {}, 1.0)
+    method = evolve(method, start=start, similarity="linear", sharpness=200.0)
+    estimate = method.solve(scene, Context())
+    assert np.isfinite(estimate.disparity[1]).all()
+    values = estimate.volume.values
+    assert 0 <= values.min() <= values.max() <= 1
 
 
 def test_a_choice_of_views_answers_in_steps_of_the_given_scene():
@@ -127,7 +141,7 @@ def test_paper_preset_is_literal():
         0,
         0,
     )
-    assert (PAPER.optimiser, PAPER.truncation, PAPER.fineness) == ("gradient", 0, 1)
+    assert (PAPER.optimiser, PAPER.truncation, PAPER.fineness, PAPER.alike) == ("gradient", 0, 1, 0)
     found = PAPER.solve(box_before_wall(), Context()).disparity[1]
     answered = found[~np.isnan(found)]
     assert answered.size > found.size / 2
