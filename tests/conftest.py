@@ -3,6 +3,7 @@
 import os
 import tempfile
 import threading
+import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -59,6 +60,7 @@ class Site:
         self.ranges = True
         self.moved: dict[str, str] = {}
         self.requests: list[list[object]] = []
+        self.counting: set[int] = set()
         self.released = threading.Event()
         site = self
 
@@ -80,6 +82,10 @@ class Site:
         self.server.server_close()
 
     def sent(self, path: str) -> list[tuple[object, ...]]:
+        """What of `requests` was of that path; a reply may be read before it is counted."""
+        end = time.monotonic() + 5
+        while self.counting and time.monotonic() < end:
+            time.sleep(0.01)
         return [tuple(rest) for name, *rest in self.requests if name == path]
 
     def _content(self, path: str) -> bytes | None:
@@ -93,6 +99,7 @@ class Site:
         path = to.path.lstrip("/")
         asked = to.headers.get("Range")
         entry: list[object] = [path, asked, 0]
+        self.counting.add(id(entry))
         self.requests.append(entry)
         faults = self.faults[path]
         fault = None if not faults else faults[0] if len(faults) == 1 and path in self.forever else faults.pop(0)
@@ -123,6 +130,7 @@ class Site:
             to.wfile.flush()
             entry[2] = min(whole, len(body))
             if kind == "stall":
+                self.counting.discard(id(entry))
                 self.released.wait(60)
             if kind == "slow":
                 for at in range(whole, len(body), 1024):
@@ -133,6 +141,8 @@ class Site:
                     entry[2] = min(at + 1024, len(body))
         except OSError:  # the other side has gone
             pass
+        finally:
+            self.counting.discard(id(entry))
         to.close_connection = True
 
 

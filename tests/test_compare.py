@@ -391,11 +391,12 @@ def test_a_sweep_of_a_scene_is_a_curve(tmp_path: Path) -> None:
 
 def test_a_pattern_leaves_out_what_its_scenes_have_not(tmp_path: Path) -> None:
     line = [sys.executable, "-m", "matbench", "ablate", "flat", "--plugin", str(METHODS), "--out", "run"]
-    line += ["-s", "synthetic/*[size=48x36 views=2,3,5,9]", "-s", "synthetic/box[size=48x36 n=9 views=2,3,5,9]"]
+    line += ["-s", "synthetic/b*[size=48x36 views=2,3,5,9]", "-s", "synthetic/c*[size=48x36 views=2,3,5,9]"]
+    line += ["-s", "synthetic/box[size=48x36 n=9 views=2,3,5,9]"]
     done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     first = done.stdout.splitlines()[0]
-    assert first.startswith("without synthetic/box[size=48x36 views=9], synthetic/curved[size=48x36 views=9], ")
+    assert first.startswith("without synthetic/box[size=48x36 views=9], synthetic/curved[size=48x36 views=9]: ")
     assert "curves: run/sweeps.csv" in done.stdout
     assert not (tmp_path / "run" / "ablation.csv").exists(), "no parameter of the method varies"
     table = pd.read_csv(tmp_path / "run" / "sweeps.csv", keep_default_na=False)
