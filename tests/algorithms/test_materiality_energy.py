@@ -233,9 +233,9 @@ def consensus_twin(space, maps):
 
 
 @settings(max_examples=25, deadline=None)
-@given(SPACES, st.integers(1, 20), st.integers(0, 999))
-def test_consensus_is_its_twin(space, rows, seed):
-    space = evolve(space, rows=rows)
+@given(SPACES, st.integers(1, 20), st.integers(1, 3), st.integers(0, 999))
+def test_consensus_is_its_twin(space, rows, fineness, seed):
+    space = evolve(space, rows=rows, fineness=fineness)
     rng = np.random.default_rng(seed)
     maps = (rng.random((space.views, space.rows, space.width)) * (space.planes - 1)).astype(np.float32)
     maps = np.where(rng.random(maps.shape) < 0.3, np.rint(maps), maps)

@@ -10,12 +10,13 @@ from matbench.algorithms.similarity import Matcher, Matching
 from matbench.scene import Range, Scene
 
 
-def moving_plane(n=4, height=18, width=20, disparity=1, least=-1, largest=3, pair_steps=1.0, **settings):
+def moving_plane(n=4, height=18, width=20, disparity=1, least=-1, largest=3, pair_steps=1.0, noise=0, **settings):
     """Views of a textured plane at one disparity."""
     rng = np.random.default_rng(0)
     texture = rng.integers(0, 256, (height, width + 3 * n * abs(disparity), 3), dtype=np.uint8)
     shift = n * abs(disparity)
     views = np.stack([texture[:, shift + j * disparity :][:, :width] for j in range(n)])
+    views = np.clip(views + rng.normal(0, noise, views.shape), 0, 255).astype(np.uint8)
     scene = Scene("plane", views, tuple(map(str, range(n))), 1, Range(least, largest), {}, pair_steps)
     return Matcher.of(scene, Matching(views=0, **settings))
 
@@ -30,7 +31,7 @@ def mended(matcher, maps, rounds):
 @pytest.mark.parametrize("rounds", [0, 2])
 @pytest.mark.parametrize(("fineness", "pair_steps"), [(1, 1.0), (2, 1.0), (2, 3.0)])
 def test_every_view_is_read_by_the_cost_on_its_own_rays(fineness, pair_steps, rounds):
-    matcher = moving_plane(fineness=fineness, pair_steps=pair_steps, window=3)
+    matcher = moving_plane(fineness=fineness, pair_steps=pair_steps, noise=80, window=3)
     reader, scene = Readings(mending=rounds, large_step=0.5), matcher.scene
     first = [reader.read(Fusion().first_cost(seen_from(matcher, view)), scene.views[view]) for view in range(scene.n)]
     expected = mended(matcher, np.stack(first), rounds)
