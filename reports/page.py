@@ -161,11 +161,11 @@ def _data(report: Report, scope: Shared) -> dict[str, Any]:
     for metric, unit in units.items():
         for region in dict.fromkeys((*shown, *found)):
             part = parts.get((metric, region), report.results.iloc[:0])
+            table = tables.per_scene(part, region, metric)
             if region in found:
-                table = tables.per_scene(part, region, metric)
                 scenes[metric][region] = _scene_entries(report, scope, table, metric)
             if region in shown:
-                mean = tables.means(part, scope, region, metric)
+                mean = tables.over_scenes(table, scope)
                 means[metric][region] = _entries(mean, ranked, unit, metric in report.higher)
     return {"methods": list(scope.methods), "regions": found, "units": units, "means": means, "scenes": scenes}
 

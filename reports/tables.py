@@ -126,7 +126,12 @@ def means(results: pd.DataFrame, scope: Shared, region: str, metric: str) -> pd.
 
     Scenes in which the region is empty, so that no method has a value, do not count.
     """
-    table = per_scene(results, region, metric).reindex(index=list(scope.asked), columns=list(scope.methods))
+    return over_scenes(per_scene(results, region, metric), scope)
+
+
+def over_scenes(table: pd.DataFrame, scope: Shared) -> pd.Series:
+    """`means` of a table that `per_scene` made."""
+    table = table.reindex(index=list(scope.asked), columns=list(scope.methods))
     filled = table.notna().any(axis=1)
     chosen = {m: [s for s in scope.counted(m) if filled[s]] for m in scope.methods}
     return pd.Series({m: table.loc[chosen[m], m].mean(skipna=False) for m in scope.methods}, dtype=float)
