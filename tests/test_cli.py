@@ -3,9 +3,9 @@
 import json
 import os
 import re
+import resource
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -194,9 +194,10 @@ def test_help_is_quick_and_imports_nothing_heavy() -> None:
     )
     best = 9.0
     for _ in range(5):
-        start = time.perf_counter()
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         said = subprocess.run([sys.executable, "-m", "matbench", "--help"], capture_output=True, text=True, check=True)
-        best = min(best, time.perf_counter() - start)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)  # what others do on the machine does not count
+        best = min(best, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
     assert "compare" in said.stdout
     assert "Download scenes" in said.stdout, "a command that is imported late has its line, too"
     assert best < 0.5

@@ -268,7 +268,7 @@ def test_interrupted_by_the_user_and_taken_up_again(tmp_path: Path) -> None:
     wait_until(lambda: any((tmp_path / "run" / "cells").glob("[0-9a-f]*")))
     time.sleep(0.5)
     os.killpg(process.pid, signal.SIGINT)
-    said, _ = process.communicate(timeout=30)
+    said, _ = process.communicate(timeout=150)
     assert process.returncode == 130, said
     assert "the same command goes on from here" in said
     assert "Traceback" not in said

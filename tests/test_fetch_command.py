@@ -180,7 +180,7 @@ def test_killed_half_way_and_gone_on_with(person: Person, site) -> None:
     process = person.start("toys/box", "--data", "data")
     until(lambda: part.exists() and part.stat().st_size > 80_000)
     process.send_signal(signal.SIGKILL)
-    process.communicate(timeout=30)
+    process.communicate(timeout=150)
     assert process.returncode == -signal.SIGKILL
     assert not any((person.root / "toys/box").glob("*.png"))
     size = part.stat().st_size
@@ -211,7 +211,7 @@ def test_interrupted_from_the_keyboard(person: Person, site) -> None:
     process = person.start("toys/box", "toys/ball", "--data", "data")
     until(lambda: part.exists() and part.stat().st_size > 80_000)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=150)
     assert process.returncode == 130
     assert "Traceback" not in err
     assert "came  toys/box" in out
@@ -246,7 +246,7 @@ def test_a_fetch_that_was_killed_holds_no_lock(person: Person, site) -> None:
     assert second.stdout is not None
     assert "waiting: toys/box" in second.stdout.readline()
     first.kill()
-    first.communicate(timeout=30)
+    first.communicate(timeout=150)
     second.communicate(timeout=60)
     assert second.returncode == 0
     assert placed(person.root) == {"box": FILES["box"]}

@@ -1,10 +1,8 @@
 """Recordings, read back: what was told is what is in the file, and no half-written file is left."""
 
 import os
-import signal
 import subprocess
 import sys
-import urllib.request
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +13,7 @@ from attrs import evolve
 
 from matbench import coloring, drawing, recording
 from matbench.algorithm import Context, Estimate, Probe
-from matbench.errors import UserError
-from matbench.recording import RecordingError, RecordingProbe, record, record_scene, view
+from matbench.recording import RecordingError, RecordingProbe, record, record_scene
 from matbench.regions import VIEW_REGIONS
 from matbench.scene import Range, Scene
 from matbench.space import DisparitySpace, Volume, visibility
@@ -373,32 +370,6 @@ def test_a_quarter_size_cell_is_small(tmp_path: Path) -> None:
 
     record(tmp_path / "r.rrd", scene, solve, title="large")
     assert (tmp_path / "r.rrd").stat().st_size < 60e6
-
-
-def test_view_needs_a_recording_and_a_display(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(UserError, match="no recording"):
-        view(path.with_name("other.rrd"), web=True)
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(UserError, match="--web"):
-        view(path)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent as a POSIX signal")
-def test_the_web_viewer_answers_and_ends_with_ctrl_c(path: Path, tmp_path: Path) -> None:
-    code = f"from pathlib import Path; from matbench.viewer import view; view(Path({str(path)!r}), web=True)"
-    # no browser: the viewer must not open one in a test
-    quiet = {**os.environ, "BROWSER": "true", "HOME": str(tmp_path)}
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=quiet) as served:
-        assert served.stdout is not None
-        address = served.stdout.readline().split()[0]
-        with urllib.request.urlopen(address, timeout=10) as page:  # noqa: S310
-            assert page.status == 200
-        served.send_signal(signal.SIGINT)
-        assert served.wait(timeout=10) == 0
-    with pytest.raises(OSError, match="refused"):
-        urllib.request.urlopen(address, timeout=10)  # noqa: S310
 
 
 def test_pairs_of_a_reference_fill_all_three_colours() -> None:
