@@ -125,25 +125,27 @@ class Materiality(Matching, Readings):
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """The reference view's map, the materialities, and what every pass came to."""
         matcher = Matcher.of(scene, self)
-        return (
-            self._fixed_point(matcher, context) if self.optimiser == "fixed_point" else self._descent(matcher, context)
-        )
+        if self.optimiser == "fixed_point":
+            return self._fixed_point(matcher, context)
+        return self._descent(matcher, context)
 
     def _fixed_point(self, matcher: Matcher, context: Context) -> Estimate:
         space, threads, probe = matcher.space, context.threads, context.probe
         if probe.active:
             self._tell_similarities(matcher, matcher.all(threads), probe)
-        readings, changed = 0, []
+        every = sum(seen_from(matcher, view).ray_comparisons for view in range(space.views))
+        changed: list[float] = []
         if self.start == "consensus":
-            maps, readings = self.first(matcher, threads), 1
+            maps, compared = self.first(matcher, threads), every
         else:
+            compared = matcher.comparisons
             mu = start(matcher, matcher.all(threads), self.start == "soft", self.sharpness, threads)
             rays = [by_ray(seen_rays(mu, space, view, threads)) for view in range(space.views)]
             # a view in which nothing is material ends in the farthest plane
             maps = np.nan_to_num(np.stack([fill_from_background(found) for found in rays]))
         for number in range(self.passes):
             before, maps = maps, self.again(matcher, maps, self.material, threads)
-            readings += 1
+            compared += every
             changed.append(float(np.mean(np.abs(maps - before) > 0.5)))
             if probe.active:
                 probe.iteration(
@@ -159,12 +161,11 @@ class Materiality(Matching, Readings):
         found = maps[matcher.scene.ref]
         if solid is not None and self.binarization != "volume":
             found = self._binarize(matcher, solid, threads)
-        compared = sum(seen_from(matcher, view).ray_comparisons for view in range(space.views))
         return Estimate(
             disparity={self._reference(matcher): matcher.disparity(found)},
             volume=None if solid is None else Volume(space, solid, matcher.indices),
             history={"changed": changed},
-            work={"passes": len(changed), "pair_similarities": readings * compared},
+            work={"passes": len(changed), "pair_similarities": compared},
         )
 
     def _descent(self, matcher: Matcher, context: Context) -> Estimate:
