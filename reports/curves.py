@@ -181,12 +181,18 @@ def _name_curves(axes: "Axes", methods: Sequence[str], beside_nothing: bool) -> 
             height = float(axes.transData.transform([(x[-1], y[-1])])[0, 1])
             ends.append((height, (x[-1], y[-1]), line.get_color(), printable(method, 34)))
     step = 72 / axes.figure.dpi  # points in a dot
-    below = -np.inf
-    for height, end, colour, name in sorted(ends, key=lambda one: one[0]):
-        broken = name.replace("[", "\n[", 1)
-        room = 13 * (broken.count("\n") + 1)
-        middle = max(height * step, below + room / 2)
-        below = middle + room / 2
+    ends.sort(key=lambda one: one[0])
+    names = [name.replace("[", "\n[", 1) for *_, name in ends]
+    rooms = [13 * (name.count("\n") + 1) for name in names]
+    middles: list[float] = []
+    for (height, *_), room in zip(ends, rooms, strict=True):  # upwards from the lowest
+        floor = middles[-1] + (rooms[len(middles) - 1] + room) / 2 if middles else -np.inf
+        middles.append(max(height * step, floor))
+    ceiling = axes.bbox.y1 * step + 6
+    for place in reversed(range(len(middles))):  # and down again from the panel's top
+        middles[place] = min(middles[place], ceiling - rooms[place] / 2)
+        ceiling = middles[place] - rooms[place] / 2
+    for (height, end, colour, _), broken, middle in zip(ends, names, middles, strict=True):
         axes.annotate(
             broken,
             end,
