@@ -1,12 +1,12 @@
 """Multi-baseline stereo by the sum of sums of squared differences (Okutomi & Kanade 1993)."""
 
 import numpy as np
-from attrs import field, frozen, validators
+from attrs import field, frozen
 from numba import njit
 
 from matbench.algorithm import Context, Estimate
 from matbench.algorithms.parallel import over_rows
-from matbench.algorithms.parameters import all_or_several, odd
+from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
 from matbench.algorithms.sampling import by_phase, fine_rows, search_space
 from matbench.algorithms.windows import square_difference
 from matbench.scene import Scene
@@ -39,7 +39,7 @@ class OkutomiKanade:
 
     window: int = field(default=7, validator=odd)
     views: int = field(default=0, validator=all_or_several)
-    fineness: int = field(default=0, validator=validators.ge(0))
+    fineness: int = field(default=0, validator=planes_a_pixel)
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """Disparities of the reference view; NaN only where no other view holds the window in any plane."""

@@ -4,9 +4,15 @@ from typing import Any
 
 
 def odd(_: object, attribute: Any, value: int) -> None:
-    """A window's side: an odd number of pixels, at least 1."""
-    if value < 1 or value % 2 == 0:
-        raise ValueError(f"{attribute.name} is {value}; it must be odd and at least 1")
+    """A window's side: an odd number of pixels, 1 to 99."""
+    if not 1 <= value <= 99 or value % 2 == 0:
+        raise ValueError(f"{attribute.name} is {value}; it must be odd, 1 to 99")
+
+
+def planes_a_pixel(_: object, attribute: Any, value: int) -> None:
+    """Planes per pixel of view step: 0 for the method's choice, at most 64."""
+    if not 0 <= value <= 64:
+        raise ValueError(f"{attribute.name} is {value}; it must be 0 (automatic) to 64")
 
 
 def all_or_several(_: object, attribute: Any, value: int) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from matbench.algorithms.features import alike, census, gradient, luma
 from matbench.algorithms.parallel import over_rows
-from matbench.algorithms.parameters import all_or_several, odd
+from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
 from matbench.algorithms.sampling import by_phase, fine_rows, search_space
 from matbench.algorithms.windows import CENSUS, EXPONENTIAL, LINEAR, MIXED, ROOT, SQUARES, pair_rows
 from matbench.algorithms.windows import FULL as FULL
@@ -69,7 +69,7 @@ class Matching:
     """
 
     views: int = field(default=9, validator=all_or_several)
-    fineness: int = field(default=0, validator=validators.ge(0))
+    fineness: int = field(default=0, validator=planes_a_pixel)
     pairs: PairSet = field(default="reference", validator=validators.in_(get_args(PairSet)))
     similarity: Form = field(default="mixed", validator=validators.in_(get_args(Form)))
     window: int = field(default=3, validator=odd)

@@ -9,7 +9,7 @@ from numba import njit
 from matbench.algorithm import Context, Estimate
 from matbench.algorithms.holes import fill_from_background
 from matbench.algorithms.parallel import over_rows
-from matbench.algorithms.parameters import all_or_several, odd
+from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
 from matbench.algorithms.sampling import fine_rows, search_space
 from matbench.scene import Scene
 from matbench.space import Volume
@@ -50,7 +50,7 @@ class VoxelColoring:
     window: int = field(default=3, validator=odd)
     fill: bool = False
     views: int = field(default=0, validator=all_or_several)
-    fineness: int = field(default=0, validator=validators.ge(0))
+    fineness: int = field(default=0, validator=planes_a_pixel)
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """Disparities of the reference view (NaN where nothing coloured it) and the 0/1 occupancy."""

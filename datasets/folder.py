@@ -30,6 +30,7 @@ from matbench.scene import Range, Scene
 from matbench.spec import first_line
 
 TOML = "scene.toml"
+_FARTHEST = 9999  # pixels per view step, far beyond the width of images
 MOST_VIEWS = 1000
 
 _KEYS = ("disparities", "pair_steps", "reference", "truth", "views")
@@ -156,6 +157,8 @@ def _disparities(path: Path, given: object) -> Range:
             f"{path}: disparities {found}: write the least and the largest in pixels per view step, "
             "such as disparities = [0, 16]"
         )
+    if any(abs(bound) > _FARTHEST for bound in bounds if bound is not None):
+        raise UserError(f"{path}: disparities = {_said(given)}: at most {_FARTHEST} pixels per view step are searched")
     try:
         return Range(*(float(bound) for bound in bounds if bound is not None))
     except UserError as error:

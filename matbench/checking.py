@@ -66,7 +66,9 @@ def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Finding]
     yield _rows(matches, called)
     yield from _borders(scene, called)
     if not scene.truth:
-        yield Finding("truth", "note", "there is none: methods can be run and looked at, not scored")
+        yield Finding(
+            "truth", "note", "there is none: a comparison needs [predict=left] or [predict=right] after the scene"
+        )
     for view in sorted(scene.truth):
         yield from _truth(evolve(scene, ref=view, regions={}), called[view])
 

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from itertools import product
+from math import isfinite
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from attrs import field, frozen
@@ -101,6 +102,13 @@ def _strict(kind: type, read: Mapping[str, Any] | None = None) -> Any:
     return hook
 
 
+def _finite(value: Any, kind: type) -> float:
+    number: float = _strict(float)(value, kind)
+    if not isfinite(number):
+        raise ValueError(value)
+    return number
+
+
 def _is_literal(kind: Any) -> bool:
     return bool(get_origin(kind) == Literal)
 
@@ -115,7 +123,7 @@ def _converter() -> Converter:
     truths = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
     converter.register_structure_hook(bool, _strict(bool, truths))
     converter.register_structure_hook(int, _strict(int))
-    converter.register_structure_hook(float, _strict(float))
+    converter.register_structure_hook(float, _finite)
     converter.register_structure_hook_func(_is_literal, _literal)
     converter.register_structure_hook_func(lambda kind: kind is Any, lambda value, _: value)
     return converter

@@ -35,7 +35,7 @@ def lines(ablation: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
         {
             "switch": f"{row['algorithm'] + ': ' if several else ''}{row['factor']} {row['base']} → {row['level']}",
             "region": row["region"],
-            "change": f"{row['change']:+.2f}",
+            "change": f"{row['change']:+.2f}" if row["change"] == row["change"] else "–",
             "interval": f"{row['low']:+.2f} .. {row['high']:+.2f}" if row["low"] == row["low"] else "–",
             "size": f"{row['effect_size']:+.1f}" if row["effect_size"] == row["effect_size"] else "–",
             "scenes": str(row["scenes"]),

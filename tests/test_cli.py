@@ -233,3 +233,22 @@ def test_a_truncated_image_is_found_before_anything_is_written(
     assert "scene1.row3.col2.ppm" in err
     assert err.count("\n") == 1
     assert not (tmp_path / "r").exists()
+
+
+def test_a_metric_that_nothing_measured_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(
+            [
+                "compare",
+                "-a",
+                "sgbm",
+                "-s",
+                "synthetic/box[size=96x64]",
+                "-m",
+                "prediction_psnr",
+                "--out",
+                str(tmp_path / "run"),
+            ]
+        )
+    assert stop.value.code == 0
+    assert "prediction_psnr was not measured" in " ".join(capsys.readouterr().out.split())

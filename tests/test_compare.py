@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import psutil
 import pytest
 from attrs import evolve
 
@@ -273,6 +274,19 @@ def test_interrupted_by_the_user_and_taken_up_again(tmp_path: Path) -> None:
     assert "the same command goes on from here" in said
     assert "Traceback" not in said
     assert cells(tmp_path).status.to_dict() == {"flat": "ok", "slow": "interrupted"}
+
+
+def test_told_to_end_it_leaves_nothing_behind(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "matbench", "compare", "-a", "flat", "slow", "--plugin", str(METHODS)]
+    line += ["-s", SMALL, "--out", str(tmp_path / "run")]
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    wait_until(lambda: any((tmp_path / "run" / "cells").glob("[0-9a-f]*")))
+    children = psutil.Process(process.pid).children(recursive=True)
+    assert children
+    process.terminate()
+    assert process.wait(timeout=150) == 130
+    assert not psutil.wait_procs(children, timeout=60)[1]
+    assert not list((tmp_path / "run" / "cells").glob(".*"))
 
 
 def test_killed_and_taken_up_again(tmp_path: Path) -> None:

@@ -99,6 +99,8 @@ def test_a_preset_is_a_start_that_options_override() -> None:
         ({"fill": "perhaps"}, "sample: fill=perhaps is not true or false"),
         ({"pairs": "some"}, "sample: pairs=some is not all or consecutive"),
         ({"sigma": "wide"}, "sample: sigma=wide is not a number"),
+        ({"sigma": "inf"}, "sample: sigma=inf is not a number"),
+        ({"sigma": float("nan")}, "sample: sigma=nan is not a number"),
         ({"preset": "best"}, "unknown preset of sample 'best'"),
         ({"window": "0"}, "sample: 'window' must be >= 1: 0"),
     ],

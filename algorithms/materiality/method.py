@@ -42,7 +42,8 @@ class Materiality(Matching, Readings):
     by projected gradient with the exact derivative of SPEC 2, and reads the map in the reference view.
     The default solver is a fixed point instead (SPEC 8): the maps of all views say how far their rays
     reach, so V and mu follow; with these all views are read again, as far as other views see each point.
-    Parameters of similarity and reader are those of `Matching` and `Readings`.
+    Parameters of similarity and reader are those of `Matching` and `Readings`; those of the energy
+    (`count` to `edge`) say nothing at the fixed point, but for `target` where planes are binarised alone.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """What `compare` and `ablate` share: a comparison run with progress shown, its tables printed, its report written."""
 
 import shlex
+import signal
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -72,16 +73,27 @@ def _run(ready: Comparison, console: Console) -> bool:
                 line = f"{outcome.status:>7}  {cell}{took}"
                 console.say(line)
 
+        # told to end, it ends its processes as if Ctrl-C had been typed
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
             ready.run(listen)
         except KeyboardInterrupt:
             return True
+        finally:
+            signal.signal(signal.SIGTERM, before)
     return False
 
 
 def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
-    if len(results) and metric not in set(results["metric"]):  # scenes without truth have predictions only
-        metric = results["metric"].iloc[0]
+    measured = list(dict.fromkeys(results["metric"]))
+    if measured and metric not in measured:
+        shown = "prediction_psnr" if "prediction_psnr" in measured else measured[0]
+        if metric != tables.METRIC:  # scenes without truth have predictions only
+            console.say(
+                f"{metric} was not measured, shown is {shown}: predictions need [predict=left] or [predict=right] "
+                "after the scene, and metrics of volumes a method that has one"
+            )
+        metric = shown
     higher = next(m.better for m in scoring.metrics() if m.name == metric) == "higher"
     for table in tables.terminal(results, cells, metric, higher, console.width):
         console.print(table)

@@ -165,7 +165,10 @@ def test_threads_and_repetition_change_nothing() -> None:
     np.testing.assert_array_equal(scene.views, before)
 
 
-@pytest.mark.parametrize("wrong", [{"window": 4}, {"window": -1}, {"views": 1}, {"views": -2}, {"fineness": -1}])
+@pytest.mark.parametrize(
+    "wrong",
+    [{"window": 4}, {"window": -1}, {"views": 1}, {"views": -2}, {"fineness": -1}, {"fineness": 65}, {"window": 101}],
+)
 def test_wrong_parameters(wrong: dict[str, int]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         OkutomiKanade(**wrong)

@@ -112,6 +112,7 @@ def test_labels_are_the_numbers_that_files_have() -> None:
         ("", ["views is missing"]),
         ("views = ['left.png', 'right.png']", ["disparities is missing", "disparities = [0, 16]"]),
         (MINIMAL + "view = 1", ["unknown key", "'view'", "did you mean 'views'"]),
+        (f"views = {NAMES}\ndisparities = [0, 1e9]", ["1000000000", "at most 9999"]),
         ("views = []\ndisparities = [0, 8]", ["0 files"]),
         ("views = ['left.png']\ndisparities = [0, 8]", ["1 files", "2 to 1000"]),
         ("views = 'left.png'\ndisparities = [0, 8]", ["'left.png'", "list"]),
