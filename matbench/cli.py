@@ -13,6 +13,7 @@ from rich import console as rich_console
 
 from matbench._version import __version__
 from matbench.errors import UserError
+from matbench.settings import Settings
 
 
 class Console(rich_console.Console):
@@ -134,11 +135,8 @@ def compare(
     ready = comparison.prepare(
         algorithm,
         scene,
-        data=data,
+        settings=Settings(data, record, None if row is None else _whole("row", row), volumes or _is_of_volumes(metric)),
         out=out,
-        record=record,
-        row=None if row is None else _whole("row", row),
-        volumes=volumes or _is_of_volumes(metric),
         seed=[_whole("seed", one) for one in seed or ("0",)],
         plugin=plugin or (),
     )
@@ -191,9 +189,8 @@ def ablate(
     ready = comparison.prepare(
         algorithms,
         scene,
-        data=data,
+        settings=Settings(data, volumes=_is_of_volumes(metric)),
         out=out,
-        volumes=_is_of_volumes(metric),
         seed=[_whole("seed", one) for one in seed or ("0",)],
         plugin=plugin or (),
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from matbench import plugins, run, scoring, spec
@@ -21,6 +21,7 @@ from matbench.errors import UserError, unknown
 from matbench.plan import Plan, make_plan, methods
 from matbench.scene import NotInScene, Scene
 from matbench.scenes import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
+from matbench.settings import Settings
 from matbench.store import Store, write_text
 
 if TYPE_CHECKING:
@@ -42,12 +43,6 @@ class Comparison:
         Name -> scene, whole, for every scene of the plan.
     command
         The line that asked for it, for the report.
-    record
-        Write a recording of every cell.
-    row
-        The image row that recordings show; the middle one of each scene if None.
-    volumes
-        Keep the volumes of the methods that have one.
     left_out
         Why -> scenes that a pattern means but that cannot be compared.
     """
@@ -55,11 +50,8 @@ class Comparison:
     plan: Plan
     store: Store
     scenes: Mapping[str, Scene]
-    data: Path | None
+    settings: Settings
     command: str
-    record: bool = False
-    row: int | None = None
-    volumes: bool = False
     left_out: Mapping[str, Sequence[str]] = {}
 
     @property
@@ -72,16 +64,7 @@ class Comparison:
         found = plugins.algorithms([Path(file) for file in self.plan.plugin_files])
         entries = [found[name].entry for name in sorted(names)]
         preload = [entry.module for entry in entries if not isinstance(entry, type)]
-        run.run(
-            self.plan,
-            self.store,
-            data=self.data,
-            record=self.record,
-            row=self.row,
-            volumes=self.volumes,
-            preload=preload,
-            listen=listen,
-        )
+        run.run(self.plan, self.store, self.settings, preload, listen)
 
     def tables(self) -> "tuple[pd.DataFrame, pd.DataFrame]":
         """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
@@ -226,24 +209,22 @@ def prepare(
     algorithms: str | Sequence[str] | None = None,
     scenes: str | Sequence[str] | None = None,
     *,
-    data: str | Path | None = None,
+    settings: Settings = Settings(),
     out: str | Path | None = None,
-    record: bool = False,
-    volumes: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     command: str | None = None,
-    row: int | None = None,
 ) -> Comparison:
     """Check everything that was asked for, read every scene, and only then write the plan.
 
     Parameters are those of `compare`.
     """
+    row = settings.row
     files = [Path(file).resolve() for file in ([plugin] if isinstance(plugin, str | Path) else plugin)]
     seeds = _seeds(seed)
     own = [p.name for file in files for p in plugins.from_file(file).values()]
     chosen = methods(algorithms if algorithms is not None else [*default_algorithms(), *own], files)
-    root = data_root(data)
+    root = data_root(settings.data)
     selected = select(scenes, root) if scenes is not None else Selection(tuple(default_scenes(root)[0]))
     if not chosen or not selected.names:
         raise UserError("nothing to compare: name at least one algorithm and one scene")
@@ -276,7 +257,7 @@ def prepare(
     folder = Path(out) if out is not None else RUNS / plan.digest
     store = Store.open(folder, plan)
     said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
-    return Comparison(plan, store, by_name, root, said, record, row, volumes, left_out)
+    return Comparison(plan, store, by_name, evolve(settings, data=root), said, left_out)
 
 
 def compare(
@@ -330,14 +311,11 @@ def compare(
     comparison = prepare(
         algorithms,
         scenes,
-        data=data,
+        settings=Settings(Path(data) if data is not None else None, record, row, volumes),
         out=out,
-        record=record,
-        volumes=volumes,
         seed=seed,
         plugin=plugin,
         command="matbench.compare(...)",
-        row=row,
     )
     comparison.run()
     results, cells = comparison.tables()

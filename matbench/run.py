@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import TimeoutError as FutureTimeout
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context
-from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
@@ -14,6 +13,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from matbench import plugins
 from matbench.plan import Cell, Plan
+from matbench.settings import Settings
 from matbench.store import FINAL, Outcome, Store, write_cell
 from matbench.worker import Job, run_cell
 
@@ -26,23 +26,21 @@ def threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def pending(
-    plan: Plan, store: Store, record: bool = False, row: int | None = None, volumes: bool = False
-) -> list[Cell]:
+def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
     """The cells that still have to be computed: those without a final outcome, or without what was asked for besides.
 
-    That is a recording that shows `row`, and the volume of a method that has one.
+    That is a recording that shows the row asked for, and the volume of a method that has one.
     """
 
     def is_done(cell: Cell) -> bool:
         outcome = store.outcome(cell)
         if outcome is None or outcome.status not in FINAL:
             return False
-        if volumes and outcome.has_volume and store.volume(cell) is None:
+        if settings.volumes and outcome.has_volume and store.volume(cell) is None:
             return False
-        if not record or outcome.status != "ok":
+        if not settings.record or outcome.status != "ok":
             return True
-        return (store.cell(cell) / "recording.rrd").exists() and row in (None, outcome.row)
+        return (store.cell(cell) / "recording.rrd").exists() and settings.row in (None, outcome.row)
 
     return [cell for cell in plan.cells if not is_done(cell)]
 
@@ -78,11 +76,7 @@ def _kernels_kept() -> Iterator[None]:
 def run(
     plan: Plan,
     store: Store,
-    *,
-    data: Path | None,
-    record: bool = False,
-    row: int | None = None,
-    volumes: bool = False,
+    settings: Settings,
     preload: Iterable[str] = (),
     listen: Listener | None = None,
 ) -> None:
@@ -95,15 +89,13 @@ def run(
 
     Parameters
     ----------
-    row
-        The image row that recordings show; the middle one if None.
     preload
         Modules that the server imports besides the harness, such as those of the methods.
     listen
         Told as each cell starts and ends.
     """
     tell = listen or (lambda *_: None)
-    todo = pending(plan, store, record, row, volumes)
+    todo = pending(plan, store, settings)
     if not todo:
         return
     store.sweep()
@@ -113,7 +105,7 @@ def run(
         try:
             for cell in todo:
                 tell("start", cell, None)
-                job = Job(store.folder, cell, data, plan.plugin_files, threads(), record, row, volumes)
+                job = Job(store.folder, cell, plan.plugin_files, threads(), settings)
                 outcome = _finish(pool, job, store)
                 tell("done", cell, outcome)
         except BaseException:

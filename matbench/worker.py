@@ -20,6 +20,7 @@ from matbench.errors import UserError
 from matbench.plan import Cell
 from matbench.scene import Scene
 from matbench.scenes import load_scene
+from matbench.settings import Settings
 from matbench.spec import first_line
 from matbench.store import Outcome, Store, write_cell
 from matbench.volumes import StoredVolume
@@ -33,22 +34,15 @@ class Job:
 
     Parameters
     ----------
-    record
-        Solve a second time, untimed, and write a recording.
-    row
-        The image row that it shows; the middle one if None.
-    volumes
-        Keep the estimate's volume, if it has one.
+    run
+        The run folder.
     """
 
     run: Path
     cell: Cell
-    data: Path | None
     plugin_files: tuple[str, ...]
     threads: int
-    record: bool
-    row: int | None = None
-    volumes: bool = False
+    settings: Settings
 
 
 def tiny(scene: Scene) -> Scene:
@@ -153,14 +147,14 @@ def _solve(
     warmed = time.perf_counter()
     _reset_peak()
     begin = time.perf_counter()
-    estimate = method.solve(scene, evolve(context, volume=job.volumes))
+    estimate = method.solve(scene, evolve(context, volume=job.settings.volumes))
     seconds = time.perf_counter() - begin
     peak = _peak_mb()
     maps = checked(estimate, scene)
     history = {name: [v if isfinite(v) else None for v in map(float, vs)] for name, vs in estimate.history.items()}
     work = {name: int(count) for name, count in estimate.work.items()}
-    volume = _volume(estimate, scene) if job.volumes else None
-    has_volume = volume is not None if job.volumes else getattr(warm, "volume", None) is not None
+    volume = _volume(estimate, scene) if job.settings.volumes else None
+    has_volume = volume is not None if job.settings.volumes else getattr(warm, "volume", None) is not None
     return Outcome("ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history), maps, volume
 
 
@@ -168,8 +162,8 @@ def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcom
     """Solve again, recorded; the outcome with the row shown, or why there is no recording: the answer itself stands."""
     from matbench.recording import record
 
-    scene = load_scene(job.cell.scene, job.data)
-    row = scene.height // 2 if job.row is None else job.row
+    scene = load_scene(job.cell.scene, job.settings.data)
+    row = scene.height // 2 if job.settings.row is None else job.settings.row
 
     def solve(probe: Any) -> Estimate:
         return method.solve(hide_truth(scene), Context(job.cell.seed, job.threads, probe))
@@ -194,11 +188,11 @@ def run_cell(job: Job) -> None:
         try:
             plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
             method = spec.build(plugin.name, plugin.load(), cell.method.params)
-            scene = hide_truth(load_scene(cell.scene, job.data))
+            scene = hide_truth(load_scene(cell.scene, job.settings.data))
             if scene.digest != cell.scene_digest:
                 raise UserError(f"{cell.scene} is not what it was when the run was planned")
             outcome, maps, volume = _solve(method, scene, job)
-            if job.record and outcome.status == "ok":
+            if job.settings.record and outcome.status == "ok":
                 outcome = _record(method, job, draft / "recording.rrd", outcome)
         except (Exception, SystemExit, KeyboardInterrupt) as error:  # Ctrl-C never comes to this process
             traceback.print_exc()

@@ -20,6 +20,7 @@ from matbench.errors import UserError
 from matbench.plan import methods
 from matbench.regions import REGIONS
 from matbench.scoring import RESULT_COLUMNS
+from matbench.settings import Settings
 from matbench.space import DisparitySpace
 
 METHODS = Path(__file__).with_name("methods.py")
@@ -213,8 +214,10 @@ def test_what_is_no_materiality_is_said_and_costs_nothing_else(tmp_path: Path) -
     log = (tmp_path / "run" / "cells" / found.cell["solid"] / "log.txt").read_text()
     assert "volume not kept" in log
     assert "from 0 to 1" in log
-    ready = comparison.prepare("solid[material=1.5]", SMALL, out=tmp_path / "run", plugin=[METHODS], volumes=True)
-    assert not comparison.run.pending(ready.plan, ready.store, record=False, volumes=True)
+    ready = comparison.prepare(
+        "solid[material=1.5]", SMALL, out=tmp_path / "run", plugin=[METHODS], settings=Settings(volumes=True)
+    )
+    assert not comparison.run.pending(ready.plan, ready.store, ready.settings)
 
 
 def test_predictions_are_scored_with_and_without_truth(tmp_path: Path) -> None:
@@ -302,7 +305,7 @@ def test_killed_and_taken_up_again(tmp_path: Path) -> None:
 
 
 def matbench_pending(ready: comparison.Comparison) -> list[comparison.run.Cell]:
-    return comparison.run.pending(ready.plan, ready.store, record=False)
+    return comparison.run.pending(ready.plan, ready.store, ready.settings)
 
 
 def wait_until(happens: object, seconds: float = 60) -> None:

@@ -14,6 +14,7 @@ import rerun as rr
 from scene_files import Layers, write_png
 
 from matbench import load_scene
+from matbench.settings import Settings
 from matbench.spec import Spec, parse
 
 README = Path(__file__).parent.parent / "README.md"
@@ -83,7 +84,7 @@ def test_the_lines_on_real_scenes_are_understood(line: str, data_root: Path, tmp
 
     tokens = shlex.split(line.replace("DIR", str(data_root)))
     scenes = [value for flag, value in pairwise(tokens) if flag == "-s"]
-    ready = comparison.prepare(["sgbm"], scenes, data=data_root, out=tmp_path / "run")
+    ready = comparison.prepare(["sgbm"], scenes, settings=Settings(data_root), out=tmp_path / "run")
     assert len(ready.scenes) >= len(scenes)
 
 

@@ -11,6 +11,7 @@ import pytest
 from matbench import comparison
 from matbench.errors import UserError
 from matbench.scenes import DATA_VARIABLE, data_root, load_scene, select, user_root
+from matbench.settings import Settings
 
 
 def write(folder: Path, *names: str) -> None:
@@ -75,12 +76,14 @@ def test_a_prediction_needs_no_truth(root: Path) -> None:
 def test_what_a_scene_has_not_is_left_out_of_patterns_only(root: Path, tmp_path: Path) -> None:
     """From two views none can be withheld; nine there are not."""
     asked = ["middlebury2006/A*[views=2,3,9 predict=right]", "middlebury2006/Baby1[views=3]"]
-    ready = comparison.prepare("sgbm", asked, data=root, out=tmp_path / "run")
+    ready = comparison.prepare("sgbm", asked, settings=Settings(root), out=tmp_path / "run")
     assert set(ready.scenes) == {"middlebury2006/Aloe[predict=right views=3]", "middlebury2006/Baby1[views=3]"}
     names = [f"middlebury2006/Aloe[views={n} predict=right]" for n in (2, 9)]
     assert ready.left_out == {"the scenes have not these views": names}
     with pytest.raises(UserError, match="at least three"):
-        comparison.prepare("sgbm", asked[1].replace("views=3", "views=2 predict=right"), data=root, out=tmp_path / "no")
+        comparison.prepare(
+            "sgbm", asked[1].replace("views=3", "views=2 predict=right"), settings=Settings(root), out=tmp_path / "no"
+        )
 
 
 def test_sizes_that_a_dataset_reads_itself_are_left_to_it() -> None:

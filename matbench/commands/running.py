@@ -54,7 +54,7 @@ def say_missing(missing: Sequence[str], data: Path | None) -> None:
 
 def _run(ready: Comparison, console: Console) -> bool:
     """Run a comparison with progress shown; True if it was interrupted."""
-    todo = len(pending(ready.plan, ready.store, ready.record, ready.row, ready.volumes))
+    todo = len(pending(ready.plan, ready.store, ready.settings))
     total = len(ready.plan.cells)
     if todo < total:
         console.say(f"{total - todo} of {total} cells are done already in {ready.folder}")
