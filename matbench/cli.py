@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+from attrs import field, frozen
 from cyclopts import App, CycloptsError, Parameter
 from rich import console as rich_console
 
@@ -62,8 +63,10 @@ Data = Annotated[
     Parameter(name="--data", help="Folder of real scenes; else MATBENCH_DATA, else where `fetch` puts them."),
 ]
 Plugins = Annotated[
-    list[Path] | None,
-    Parameter(name="--plugin", negative="", help="Python file with methods of your own; may be repeated."),
+    list[Path],
+    Parameter(
+        name="--plugin", negative="", show_default=False, help="Python file with methods of your own; may be repeated."
+    ),
 ]
 
 
@@ -71,9 +74,28 @@ def _many(short: str, long: str, text: str) -> Parameter:
     return Parameter(name=[long, short], consume_multiple=True, negative="", help=text)
 
 
-Seeds = Annotated[
-    list[str] | None, Parameter(consume_multiple=True, negative="", help="Whole number, one or several; default 0.")
-]
+@Parameter(name="*")
+@frozen
+class Options:
+    """What `compare` and `ablate` both take."""
+
+    data: Data = None
+    out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None
+    seed: Annotated[
+        list[str],
+        Parameter(
+            consume_multiple=True, negative="", show_default=False, help="Whole number, one or several; default 0."
+        ),
+    ] = field(factory=lambda: ["0"])
+    plugin: Plugins = field(factory=list)
+    metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1"
+
+    @property
+    def seeds(self) -> list[int]:
+        return [_whole("seed", one) for one in self.seed]
+
+
+DEFAULTS = Options()
 
 
 @app.command(help_epilogue="")
@@ -89,16 +111,12 @@ def compare(
             "-s", "--scene", "Scene or pattern, such as `middlebury2003/teddy[views=0:9:2]`, `synthetic/*` or `paper`."
         ),
     ] = None,
-    data: Data = None,
-    out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,
     record: Annotated[bool, Parameter(negative="", help="Also write a recording of every cell for `view`.")] = False,
     row: Annotated[str | None, Parameter(help="Image row of the recordings' slices; default the middle one.")] = None,
     volumes: Annotated[
         bool, Parameter(negative="", help="Also keep and score the volumes of methods that have one.")
     ] = False,
-    seed: Seeds = None,
-    plugin: Plugins = None,
-    metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1",
+    options: Options = DEFAULTS,
 ) -> int:
     """Run methods on scenes, score them, and write tables and a report.
 
@@ -127,20 +145,22 @@ def compare(
     from matbench import comparison
     from matbench.commands import running
 
-    _check_metric(metric)
+    _check_metric(options.metric)
     if row is not None and not record:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
-        running.say_missing(comparison.default_scenes(data)[1], data)
+        running.say_missing(comparison.default_scenes(options.data)[1], options.data)
     ready = comparison.prepare(
         algorithm,
         scene,
-        settings=Settings(data, record, None if row is None else _whole("row", row), volumes or _is_of_volumes(metric)),
-        out=out,
-        seed=[_whole("seed", one) for one in seed or ("0",)],
-        plugin=plugin or (),
+        settings=Settings(
+            options.data, record, None if row is None else _whole("row", row), volumes or _is_of_volumes(options.metric)
+        ),
+        out=options.out,
+        seed=options.seeds,
+        plugin=options.plugin,
     )
-    return running.work(ready, metric)
+    return running.work(ready, options.metric)
 
 
 @app.command(help_epilogue="")
@@ -150,11 +170,7 @@ def ablate(
     scene: Annotated[
         list[str] | None, _many("-s", "--scene", "Scene or pattern, as for `compare`; the more, the better.")
     ] = None,
-    data: Data = None,
-    out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None,
-    seed: Seeds = None,
-    plugin: Plugins = None,
-    metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1",
+    options: Options = DEFAULTS,
 ) -> int:
     """Run every combination of a method's parameters and tell what each factor does.
 
@@ -179,22 +195,22 @@ def ablate(
     from matbench.commands import running
     from matbench.plan import methods
 
-    _check_metric(metric)
+    _check_metric(options.metric)
     algorithms: list[str] = [selector]
     if selector.endswith(".toml"):
         algorithms, listed = comparison.read_request(Path(selector))
         scene = scene or listed
-    chosen = methods(algorithms, plugin or ())
+    chosen = methods(algorithms, options.plugin)
     ablation.check_varies(chosen, scene or ())
     ready = comparison.prepare(
         algorithms,
         scene,
-        settings=Settings(data, volumes=_is_of_volumes(metric)),
-        out=out,
-        seed=[_whole("seed", one) for one in seed or ("0",)],
-        plugin=plugin or (),
+        settings=Settings(options.data, volumes=_is_of_volumes(options.metric)),
+        out=options.out,
+        seed=options.seeds,
+        plugin=options.plugin,
     )
-    return running.work(ready, metric, is_ablation=any(ablation.factors(chosen).values()))
+    return running.work(ready, options.metric, is_ablation=any(ablation.factors(chosen).values()))
 
 
 def _whole(name: str, text: str) -> int:
@@ -223,7 +239,7 @@ def _is_of_volumes(metric: str) -> bool:
 def list_(
     *,
     data: Data = None,
-    plugin: Plugins = None,
+    plugin: Plugins = [],  # noqa: B006 -- never changed
     as_json: Annotated[bool, Parameter(name="--json", negative="", help="Machine-readable.")] = False,
 ) -> int:
     """Show algorithms with their parameters, scenes with their sizes, and metrics.
@@ -236,7 +252,7 @@ def list_(
     """
     from matbench import listing
 
-    known = listing.known(data, plugin or ())
+    known = listing.known(data, plugin)
     if as_json:
         print(json.dumps(known, indent=1))
     else:
