@@ -1,6 +1,7 @@
 """Fixtures for tests of all parts."""
 
 import os
+import signal
 import tempfile
 import threading
 import time
@@ -18,6 +19,8 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))
 # tests neither find nor touch the scenes of whoever runs them
 _own = tempfile.TemporaryDirectory(prefix="matbench-tests-")
 os.environ["XDG_DATA_HOME"] = _own.name
+# tests press Ctrl-C: a shell that starts them in the background would have their processes ignore it
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
