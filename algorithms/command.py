@@ -82,8 +82,8 @@ class Command:
     The two images are those that `sgbm` matches, both mirrored if the other view is to the left. A
     range that does not begin at 0 is shifted to it: both images are continued at opposite sides by
     the least disparity, repeating the edge. The program starts in its own folder; the number of
-    threads stands in OMP_NUM_THREADS. Its output goes to the cell's log. It ends with the cell (on Linux;
-    what it started itself may not).
+    threads stands in OMP_NUM_THREADS. Its output goes to the cell's log. It ends with the process that
+    waits for it, however that ends (on Linux).
 
     Parameters
     ----------

@@ -1,10 +1,11 @@
 """What every method owes the harness, tried on small scenes, each in a process of its own (`matbench check`)."""
 
+import os
 import tempfile
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import TimeoutError as FutureTimeout
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from functools import cache
 from hashlib import sha256
 from multiprocessing import get_context
@@ -24,7 +25,7 @@ from matbench.scene import Range, Scene
 from matbench.scenes import load_scene
 from matbench.spec import first_line
 from matbench.volumes import StoredVolume
-from matbench.worker import _output_to, checked, hide_truth
+from matbench.worker import checked, hide_truth
 
 Verdict = Literal["pass", "fail", "skipped", "note"]
 
@@ -159,9 +160,25 @@ def trials() -> Mapping[str, Trial]:
     return {**found, "easy, 3 threads": Trial.of("easy", easy, threads=3)}
 
 
+@contextmanager
+def _printing_to(path: Path) -> Iterator[None]:
+    """Send all that this process prints, from Python or from C, to a file."""
+    with path.open("w", encoding="utf-8", errors="replace", buffering=1) as log:
+        kept = os.dup(1), os.dup(2)
+        os.dup2(log.fileno(), 1)
+        os.dup2(log.fileno(), 2)
+        try:
+            with redirect_stdout(log), redirect_stderr(log):
+                yield
+        finally:
+            for saved, number in zip(kept, (1, 2), strict=True):
+                os.dup2(saved, number)
+                os.close(saved)
+
+
 def solve(method: Method, files: Sequence[Path], trial: Trial, log: Path) -> Answer:
     """Solve one trial in this process; what the method raises is told in the answer."""
-    with _output_to(log):
+    with _printing_to(log):
         try:
             plugin = plugins.algorithm(method.algorithm, files)
             instance = spec.build(plugin.name, plugin.load(), method.params)
