@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from matbench import contract
+from matbench.cli import main
 from matbench.contract import Finding, mirrored
 from matbench.plan import methods
 from matbench.scene import Scene
@@ -40,10 +41,12 @@ def failed(found: list[Finding]) -> set[str]:
     return {finding.check for finding in found if finding.verdict == "fail"}
 
 
-def matbench(*words: str | Path, path: Path | None = None) -> subprocess.CompletedProcess[str]:
-    env = os.environ | ({"PYTHONPATH": str(path)} if path else {})
-    line = [sys.executable, "-m", "matbench", *map(str, words)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=300, env=env)
+def run(capsys: pytest.CaptureFixture[str], *words: str | Path) -> tuple[int, str, str]:
+    """Exit status, output and errors of a command line."""
+    with pytest.raises(SystemExit) as ended:
+        main(list(map(str, words)))
+    told = capsys.readouterr()
+    return int(ended.value.code or 0), told.out, told.err
 
 
 def unlike(scene: Scene, sign: int = 1) -> float:
@@ -158,16 +161,13 @@ def test_a_method_that_hangs_is_ended_and_nothing_else_is_tried() -> None:
     assert "not tried" in next(f.reason for f in found if f.check == "tiny")
 
 
-def test_the_readme_s_example_passes_on_the_command_line(tmp_path: Path) -> None:
+def test_the_readme_s_example_passes_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     readme = (HERE.parent / "README.md").read_text()
     (example,) = re.findall(r"```python\n(import numpy as np\n.*?class Mine:.*?)```", readme, re.DOTALL)
     (tmp_path / "mine.py").write_text(example)
-    ended = matbench("check", tmp_path / "mine.py")
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert "mine passes" in ended.stdout
-
-    ended = matbench("check", f"{tmp_path}/mine.py[share=0,1]", "--json")
-    told = json.loads(ended.stdout)
+    status, out, _ = run(capsys, "check", f"{tmp_path}/mine.py[share=0,1]", "--json")
+    assert status == 0
+    told = json.loads(out)
     assert [one["method"] for one in told] == ["mine[share=0.0]", "mine[share=1.0]"]
     assert {check["verdict"] for one in told for check in one["checks"]} == {"pass"}
 
@@ -186,25 +186,29 @@ def test_a_package_that_is_installed_is_found_by_its_entry_point(tmp_path: Path)
         str(tmp_path / "package"),
     ]
     subprocess.run(pip, check=True, timeout=300)
-    ended = matbench("check", "middle_plane[share=0.25]", path=tmp_path / "there")
+    line = [sys.executable, "-m", "matbench", "check", "middle_plane[share=0.25]"]
+    env = os.environ | {"PYTHONPATH": str(tmp_path / "there")}
+    ended = subprocess.run(line, capture_output=True, text=True, timeout=300, env=env)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert "middle_plane[share=0.25] passes" in ended.stdout
-    assert matbench("check", "middle_plane").returncode == 2
 
 
-def test_failures_and_wrong_usage_have_their_own_exit_status(tmp_path: Path) -> None:
-    ended = matbench("check", "leaning", "--plugin", UNRULY)
-    assert ended.returncode == 1
-    assert "leaning fails: mirror" in ended.stdout
+def test_failures_and_wrong_usage_have_their_own_exit_status(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, _ = run(capsys, "check", "leaning", "--plugin", UNRULY)
+    assert status == 1
+    assert "leaning fails: mirror" in out
     for words, said in [
         ((), "no method"),
         (("sgmb",), "did you mean 'sgbm'"),
+        (("middle_plane",), "unknown algorithm"),
         (("sgbm[fil=true]",), "unknown parameter"),
         (("sgbm", "--timeout", "0"), "timeout 0"),
         ((str(tmp_path / "none.py"),), "does not exist"),
         (("command",), "program must be given"),
     ]:
-        ended = matbench("check", *words)
-        assert ended.returncode == 2, words
-        assert said in ended.stderr
-        assert ended.stderr.count("\n") == 1
+        status, _, err = run(capsys, "check", *words)
+        assert status == 2, words
+        assert said in err
+        assert err.count("\n") == 1

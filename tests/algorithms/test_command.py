@@ -12,9 +12,9 @@ import numpy as np
 import psutil
 import pytest
 
-from matbench import Context, Range, Scene, compare
+from matbench import Context, Range, Scene
 from matbench.algorithms.command import Command
-from matbench.comparison import default_algorithms
+from matbench.comparison import default_algorithms, prepare
 from matbench.contract import check, mirrored
 from matbench.errors import UserError
 from matbench.plan import methods
@@ -57,26 +57,24 @@ def matcher(tmp_path: Path) -> str:
     return program(tmp_path / "my programs" / "block matcher", MATCHER)
 
 
+@pytest.fixture(scope="module")
+def box() -> Scene:
+    return load_scene("synthetic/box[n=5 ref=1]")
+
+
 def bad(scene: Scene, found: np.ndarray) -> float:
     return 100 * float(np.mean(~(np.abs(found - scene.truth[scene.ref]) * scene.pair_steps <= 1.0001)))
 
 
 def test_a_program_competes_with_ranges_of_any_sign_and_its_pair_on_either_side(
-    matcher: str, capfd: pytest.CaptureFixture[str]
+    matcher: str, box: Scene, capfd: pytest.CaptureFixture[str]
 ) -> None:
     method = Command(matcher)
-    for name, most in [("synthetic/box[n=5 ref=1]", 5), ("synthetic/curved[n=5 ref=1]", 12)]:
-        scene = load_scene(name)
+    for scene, most in [(box, 5), (load_scene("synthetic/curved[n=5 ref=1]"), 12)]:
         found = method.solve(scene, Context(threads=3)).disparity[1]
         assert bad(scene, found) < most
-        other = mirrored(scene)
-        assert np.array_equal(method.solve(other, Context()).disparity[3], found[:, ::-1])
+        assert np.array_equal(method.solve(mirrored(scene), Context()).disparity[3], found[:, ::-1])
     assert "17 disparities, 3 threads" in capfd.readouterr().out
-    # a range that begins above 0 is shifted, too, and loses nothing at either side
-    near = Scene("near", scene.views[..., :64, :], scene.labels, 1, Range(2, 4), {}, 2)
-    whole = method.solve(near, Context()).disparity[1]
-    assert np.nanmin(whole) >= 2
-    assert np.nanmax(whole) <= 4
 
 
 def shifted(least: int, largest: int) -> Scene:
@@ -98,16 +96,14 @@ def test_a_shifted_range_gives_the_exact_disparity_up_to_the_frame(matcher: str,
     assert (found[:, seen] == d).all()
 
 
-def test_a_c_program_competes_behind_a_run_script(tmp_path: Path) -> None:
+def test_a_c_program_competes_behind_a_run_script(tmp_path: Path, box: Scene) -> None:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
     binary = tmp_path / "matcher"
     subprocess.run([compiler, "-O2", PROGRAMS / "block_matcher.c", "-lm", "-o", binary], check=True)
     run = program(tmp_path / "run", (PROGRAMS / "run_c.py").read_text())
-    scene = load_scene("synthetic/box[n=5 ref=1]")
-    found = Command(run).solve(scene, Context()).disparity[1]
-    assert bad(scene, found) < 6
+    assert bad(box, Command(run).solve(box, Context()).disparity[1]) < 6
 
     (one,) = methods(f"command[program='{run}' files='{binary}']")
     binary.write_bytes(binary.read_bytes() + b"\0")
@@ -115,14 +111,13 @@ def test_a_c_program_competes_behind_a_run_script(tmp_path: Path) -> None:
     assert one.code != two.code
 
 
-def test_arguments_stand_where_they_are_wanted(tmp_path: Path) -> None:
+def test_arguments_stand_where_they_are_wanted(tmp_path: Path, box: Scene) -> None:
     swapped = MATCHER.replace("sys.argv[1:3]", "sys.argv[4:6]").replace("sys.argv[3]", "'6'").replace(
         "sys.argv[4]", "sys.argv[2].removeprefix('dir=')"
     )  # fmt: skip
     path = program(tmp_path / "swapped", f"import sys\nassert sys.argv[3] == 'a  $HOME;'\n{swapped}")
     args = "--out dir={out} 'a  $HOME;' {left} {right}".replace("--out ", "-o ")
-    scene = load_scene("synthetic/box[n=5 ref=1]")
-    assert np.isfinite(Command(path, args=args).solve(scene, Context()).disparity[1]).any()
+    assert np.isfinite(Command(path, args=args).solve(box, Context()).disparity[1]).any()
 
 
 def test_only_infinite_and_nan_are_no_answer(tmp_path: Path) -> None:
@@ -137,11 +132,11 @@ def test_only_infinite_and_nan_are_no_answer(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("lie", LIES)
-def test_a_lying_program_is_told_what_its_map_is(lie: str, tmp_path: Path) -> None:
+def test_a_lying_program_is_told_what_its_map_is(lie: str, tmp_path: Path, box: Scene) -> None:
     source, said = LIES[lie]
     method = Command(program(tmp_path / "liar", START + source))
     with pytest.raises((UserError, RuntimeError)) as error:
-        method.solve(load_scene("synthetic/box[n=5 ref=1]"), Context())
+        method.solve(box, Context())
     assert said in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -153,14 +148,14 @@ def test_a_lying_program_is_told_what_its_map_is(lie: str, tmp_path: Path) -> No
         ("os.kill(os.getpid(), 11)", "signal 11"),
     ],
 )
-def test_a_failing_program_is_quoted(source: str, said: str, tmp_path: Path) -> None:
+def test_a_failing_program_is_quoted(source: str, said: str, tmp_path: Path, box: Scene) -> None:
     method = Command(program(tmp_path / "bad", START + source))
     with pytest.raises(RuntimeError, match=said) as error:
-        method.solve(load_scene("synthetic/box[n=5 ref=1]"), Context())
+        method.solve(box, Context())
     assert ("giving up" in str(error.value)) == ("exit" in said)
 
 
-def test_what_cannot_be_started_is_refused_in_one_line(tmp_path: Path, matcher: str) -> None:
+def test_what_cannot_be_started_is_refused_in_one_line(tmp_path: Path, matcher: str, box: Scene) -> None:
     plain = tmp_path / "plain"
     plain.write_text("")
     for selector, said in [
@@ -179,7 +174,7 @@ def test_what_cannot_be_started_is_refused_in_one_line(tmp_path: Path, matcher: 
     wrong = program(tmp_path / "shebang", "")
     Path(wrong).write_text("#!/no/such/interpreter\n")
     with pytest.raises(RuntimeError, match="cannot be started"):
-        Command(wrong).solve(load_scene("synthetic/box[n=5 ref=1]"), Context())
+        Command(wrong).solve(box, Context())
 
 
 def is_gone(pid: int, patience: float = 20) -> bool:
@@ -235,14 +230,22 @@ def test_the_check_passes_an_honest_program_and_ends_a_hanging_one(tmp_path: Pat
 def test_cells_of_programs_good_and_bad_and_a_changed_program_is_another_cell(tmp_path: Path, matcher: str) -> None:
     broken = program(tmp_path / "broken", START + "print('out of luck'); sys.exit(4)")
     chosen = [f"command[program='{path}']" for path in (matcher, broken)]
-    scores = compare(chosen, "synthetic/box", out=tmp_path / "run")
-    bad_1 = scores[(scores.metric == "total_bad_1") & (scores.region == "all")]
-    assert bad_1.value.max() < 6
-    assert bad_1.params.tolist() == [f"program='{matcher}'"]
-    logs = [path.read_text() for path in sorted((tmp_path / "run" / "cells").glob("*/log.txt"))]
-    assert any("disparities," in log for log in logs)
-    assert any("out of luck" in log for log in logs)
+
+    def cells() -> dict[str, tuple[str, float]]:
+        ready = prepare(chosen, "synthetic/box", out=tmp_path / "run")
+        ready.run()
+        scores, found = ready.tables()
+        bad_1 = scores[(scores.metric == "total_bad_1") & (scores.region == "all")].set_index("params").value
+        return {params: (status, bad_1.get(params)) for params, status in zip(found.params, found.status, strict=True)}
+
+    good, ill = f"program='{matcher}'", f"program={broken}"
+    first = cells()
+    assert first[good][0] == "ok"
+    assert first[good][1] < 6
+    assert first[ill] == ("failed", None)
+    logs = "".join(path.read_text() for path in (tmp_path / "run" / "cells").glob("*/log.txt"))
+    assert "disparities, " in logs
+    assert "out of luck" in logs
 
     Path(matcher).write_text(Path(matcher).read_text().replace("found[::-1]", "(0 * found[::-1])"))
-    changed = compare(chosen, "synthetic/box", out=tmp_path / "run")
-    assert changed[(changed.metric == "total_bad_1") & (changed.region == "all")].value.min() > 20
+    assert cells()[good][1] > 20
