@@ -91,6 +91,8 @@ class Algorithm(Protocol):
         Why this scene cannot be solved; its cell is then skipped, not failed.
     ``presets: ClassVar[Mapping[str, Mapping[str, object]]]``
         Named sets of parameters, chosen as ``name[preset=paper]``.
+    ``code_files: Sequence[Path]``
+        Files besides its own code whose content decides its answers, such as a program or weights.
     """
 
     def solve(self, scene: Scene, context: Context) -> Estimate:

@@ -46,6 +46,8 @@ app = App(
 
 `matbench ablate 'materiality[pairs=all,consecutive]' -s 'middlebury*/*' --data DATA`
 
+`matbench check mine.py`  does a method of your own keep to what is asked of it?
+
 `matbench list`  methods with their parameters, scenes, metrics
 
 `matbench fetch paper`  download the paper's three scenes
@@ -291,6 +293,7 @@ def view(
     return DONE
 
 
+app.command("matbench.commands.check:app", name="check", help="Try methods: do they keep to what is asked of them?")
 app.command("matbench.commands.fetch:app", name="fetch", help="Download scenes, check them, and put them in place.")
 app.command("matbench.commands.scene:app", name="scene", help="Look at scenes, check them, and make your own.")
 

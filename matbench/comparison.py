@@ -157,8 +157,9 @@ def _processor() -> str:
 
 
 def default_algorithms() -> list[str]:
-    """All built-in methods."""
-    return [p.name for p in plugins.installed("algorithms").values() if p.source == "matbench-stereo"]
+    """All built-in methods that need not be told anything."""
+    built_in = [p for p in plugins.installed("algorithms").values() if p.source == "matbench-stereo"]
+    return [p.name for p in built_in if not spec.required(p.load())]
 
 
 def default_scenes(data: str | Path | None = None) -> tuple[list[str], list[str]]:

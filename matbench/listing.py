@@ -107,4 +107,6 @@ def tables(everything: dict[str, Any]) -> list[Table]:
 
 
 def _shown(value: Any) -> str:
+    if value is None:
+        return "..., to be given"
     return str(value).lower() if isinstance(value, bool) else str(value)

@@ -117,7 +117,7 @@ def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[
         preset = one.options.get("preset") if "preset" not in spec.parameters(type(instance)) else None
         changed = spec.text(spec.changed(instance, preset))
         params = spec.values_of(instance)
-        method = Method(plugin.name, params, changed, plugins.code_digest(plugin))
+        method = Method(plugin.name, params, changed, plugins.method_digest(plugin, instance))
         found.setdefault(spec.label(plugin.name, params), method)  # spelled in two ways, it is one method
     return list(found.values())
 

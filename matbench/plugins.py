@@ -173,6 +173,26 @@ def code_digest(plugin: Plugin) -> str:
     return digest.hexdigest()
 
 
+def method_digest(plugin: Plugin, instance: object) -> str:
+    """`code_digest`, and that of what the method's `code_files` hold, if it names any.
+
+    Raises
+    ------
+    UserError
+        If one of them cannot be read.
+    """
+    files = getattr(instance, "code_files", ())
+    if not files:
+        return code_digest(plugin)
+    digest = sha256(code_digest(plugin).encode())
+    for file in files:
+        try:
+            digest.update(sha256(Path(file).read_bytes()).digest())
+        except OSError as error:
+            raise UserError(f"{plugin.name}: {str(file)!r} cannot be read: {error.strerror}") from error
+    return digest.hexdigest()
+
+
 def _versions() -> str:
     return " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "opencv-python-headless"))
 

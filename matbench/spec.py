@@ -1,7 +1,8 @@
 """Selectors such as ``materiality[pairs=all,consecutive passes=20]``: a name and options in brackets.
 
-Options are separated by blanks; commas inside a value mean "each of these in turn". Brackets are
-read before anything else, so what stands before them may be a glob pattern.
+Options are separated by blanks; commas inside a value mean "each of these in turn"; quotes hold
+together a value that has blanks or commas in it. Brackets are read before anything else, so what
+stands before them may be a glob pattern.
 """
 
 import inspect
@@ -42,7 +43,24 @@ def label(name: str, options: Mapping[str, Value]) -> str:
 
 def text(options: Mapping[str, Value]) -> str:
     """``key=value ...`` as it is typed."""
-    return " ".join(f"{key}={str(v).lower() if v is None or isinstance(v, bool) else v}" for key, v in options.items())
+    return " ".join(f"{key}={_typed(value)}" for key, value in options.items())
+
+
+def _typed(value: Value) -> str:
+    said = str(value).lower() if value is None or isinstance(value, bool) else str(value)
+    if isinstance(value, str) and re.search(r"[\s,'\"]", said):
+        quote = '"' if "'" in said else "'"
+        return f"{quote}{said}{quote}"
+    return said
+
+
+_VALUES = r"""(?:'[^']*'|"[^"]*"|[^\s,])"""
+
+
+def _values(text: str) -> list[str]:
+    """What stands between commas, without quotes around it."""
+    found = re.findall(rf"(?:^|,)({_VALUES}*)", text)
+    return [one[1:-1] if re.fullmatch(r"""'[^']*'|"[^"]*\"""", one) else one for one in found]
 
 
 def parse(selector: str) -> list[Spec]:
@@ -65,13 +83,13 @@ def parse(selector: str) -> list[Spec]:
             )
         name, inside = found.group(1), found.group(2) or ""
         choices: dict[str, list[str]] = {}
-        for option in inside.split():
+        for option in re.findall(rf"(?:{_VALUES}|,)+", inside):
             key, equals, values = option.partition("=")
-            if not (key and equals and all(values.split(","))):
+            if not (key and equals and all(_values(values))):
                 raise UserError(f"cannot read {option!r} in {part.strip()!r}: write key=value or key=value,value")
             if key in choices:
                 raise UserError(f"{key!r} stands twice in {part.strip()!r}: write {key}=value,value for each in turn")
-            choices[key] = values.split(",")
+            choices[key] = _values(values)
         specs += [Spec(name, dict(zip(choices, picked, strict=True))) for picked in product(*choices.values())]
     return specs
 
@@ -155,6 +173,11 @@ def parameters(cls: type) -> dict[str, tuple[Any, Any]]:
     return {p.name: (hints.get(p.name, _kind_of(p.default)), p.default) for p in taken}
 
 
+def required(cls: type) -> list[str]:
+    """The parameters that have no default."""
+    return [key for key, (_, default) in parameters(cls).items() if default is inspect.Parameter.empty]
+
+
 def _kind_of(default: object) -> Any:
     """The type of a parameter that has no annotation: that of its default, if it is a simple one."""
     return type(default) if type(default) in (bool, int, float, str) else Any
@@ -191,7 +214,7 @@ def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
             values[key] = _converter().structure(value, kind)
         except Exception:  # whatever a converter raises for a value that is not of its type
             raise UserError(f"{name}: {key}={value} is not {describe(kind)}") from None
-    missing = [key for key, (_, default) in fields.items() if default is inspect.Parameter.empty and key not in values]
+    missing = [key for key in required(cls) if key not in values]
     if missing:
         raise UserError(f"{name}: {', '.join(missing)} must be given, as {name}[{missing[0]}=VALUE]")
     try:

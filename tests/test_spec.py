@@ -42,6 +42,13 @@ def test_brackets_are_read_before_patterns_and_slices() -> None:
     ]
 
 
+def test_quotes_hold_blanks_and_commas_together_and_are_written_again() -> None:
+    (one, two) = parse("a[x='my folder/a, b',c y=\"it's\"]")
+    assert one == Spec("a", {"x": "my folder/a, b", "y": "it's"})
+    assert two.options["x"] == "c"
+    assert parse(str(one)) == [one]
+
+
 def test_commas_outside_brackets_separate_selectors() -> None:
     assert [s.name for s in expand(["a,b[x=1,2]", "a"])] == ["a", "b", "b"]
 
