@@ -27,14 +27,19 @@ class Readings(Fusion, SemiGlobal):
 
     def first(self, matcher: Matcher, threads: int = 1) -> NDArray[np.float32]:
         """(views, H, W) maps by the better half of the pairs, as planes of the space; mended."""
-        return self._read_all(matcher, lambda seen, phases: self.first_cost(seen, threads, phases), threads)
+        return self._read_all(matcher, lambda seen, phases: self.first_cost(seen, threads, phases), threads)[0]
 
     def again(
         self, matcher: Matcher, maps: NDArray[np.float32], material: float, threads: int = 1
-    ) -> NDArray[np.float32]:
+    ) -> tuple[NDArray[np.float32], float, float]:
         """The same by the pairs that see a point where the rays end as `maps` say.
 
         The cost of a point is that of `Fusion.seen_cost`, plus material (1 - mu).
+
+        Returns
+        -------
+        The maps, and what `maps` and the new ones, before they are mended, cost by these costs: the mean over
+        the views of `SemiGlobal.energy`.
         """
 
         def cost(seen: Matcher, phases: Features) -> NDArray[np.float32]:
@@ -43,15 +48,26 @@ class Readings(Fusion, SemiGlobal):
             mu *= np.float32(material)
             return np.add(least, mu, out=least)
 
-        return self._read_all(matcher, cost, threads)
+        found, energies = self._read_all(matcher, cost, threads, maps)
+        before, after = energies.mean(axis=0)
+        return found, float(before), float(after)
 
     def _read_all(
-        self, matcher: Matcher, cost: Callable[[Matcher, Features], NDArray[np.float32]], threads: int
-    ) -> NDArray[np.float32]:
+        self,
+        matcher: Matcher,
+        cost: Callable[[Matcher, Features], NDArray[np.float32]],
+        threads: int,
+        known: NDArray[np.float32] | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
         space, scene, phases = matcher.space, matcher.scene, matcher.phases()
         maps = np.empty((space.views, space.rows, space.width), np.float32)
-        for view in range(space.views):
-            maps[view] = self.read(cost(seen_from(matcher, view), phases), scene.views[view], threads)
+        energies = np.zeros((space.views, 2))
+        for view, image in enumerate(scene.views):
+            paid = cost(seen_from(matcher, view), phases)
+            maps[view] = self.read(paid, image, threads)
+            if known is not None:
+                energies[view] = [self.energy(paid, image, of) for of in (known[view], maps[view])]
         steps = (maps + np.float32(space.first)) / np.float32(space.fineness)
         mended = mend(steps, scene.views, 1 / scene.pair_steps, self.mending, threads)
-        return np.asarray(mended * np.float32(space.fineness) - np.float32(space.first), np.float32)
+        planes = np.asarray(mended * np.float32(space.fineness) - np.float32(space.first), np.float32)
+        return planes, energies

@@ -157,6 +157,30 @@ def winner(total, cost):  # type: ignore[no-untyped-def]
     return found
 
 
+@kernel
+def _energies(cost, image, planes, small, large):  # type: ignore[no-untyped-def]
+    """(H,) sums of E over the pixels of each row: their own costs, and what they pay to four of their neighbours."""
+    height, width, _ = cost.shape
+    found = np.zeros(height)
+    for y in range(height):
+        for x in range(width):
+            k = planes[y, x]
+            if k < 0:
+                continue
+            if cost[y, x, k] == cost[y, x, k]:
+                found[y] += cost[y, x, k]
+            for d in range(4):  # the pixel before, and the three of the row before: each pair of neighbours once
+                x_old, y_old = (x - 1, y) if d == 3 else (x + d - 1, y - 1)
+                if x_old < 0 or x_old >= width or y_old < 0 or planes[y_old, x_old] < 0:
+                    continue
+                step = abs(k - planes[y_old, x_old])
+                if step == 1:
+                    found[y] += small
+                elif step > 1:
+                    found[y] += large[_contrast(image[y, x], image[y_old, x_old])]
+    return found
+
+
 @frozen(slots=False)  # a second base class must not have slots
 class SemiGlobal:
     """How costs in [0, 1] are read: what materiality and its control have in common.
@@ -190,6 +214,23 @@ class SemiGlobal:
         (H, W) float32, NaN where all costs are.
         """
         return np.asarray(winner(self.sums(cost, image, threads), cost))
+
+    def energy(self, cost: NDArray[np.float32], image: NDArray[np.uint8], planes: NDArray[np.float32]) -> float:
+        """What a map costs, per pixel: the energy that `read` looks for the least of (Hirschmueller 2008, equation 3).
+
+        E = sum over pixels of cost(p, D_p) + sum over neighbours, eight around a pixel and each pair once,
+        of P1 where their planes differ by one and of P2 where they differ by more.
+
+        Parameters
+        ----------
+        cost, image
+            As for `read`.
+        planes
+            (H, W) plane indices, rounded to whole ones; a pixel without an answer (NaN) pays nothing.
+        """
+        whole = np.nan_to_num(np.rint(planes), nan=-1).astype(np.int64)
+        large = penalties(self.small_step, self.large_step, self.contrast)
+        return float(_energies(cost, image, whole, np.float32(self.small_step), large).sum() / planes.size)
 
     def sums(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
         """(H, W, K) path costs, summed over the eight directions; see `aggregate`."""

@@ -58,14 +58,27 @@ def test_a_pass_reads_all_views_by_what_the_last_maps_say(passes):
     scene = box(ref="1")
     method = Materiality(passes=passes)
     estimate = method.solve(scene, Context())
-    matcher, reader, changed = Matcher.of(scene, method), Readings(), []
+    matcher, reader = Matcher.of(scene, method), Readings()
+    history = {"changed": [], "energy_before": [], "energy": []}
     maps = reader.first(matcher)
     for _ in range(passes):
-        before, maps = maps, reader.again(matcher, maps, method.material)
-        changed.append(np.mean(np.abs(maps - before) > 0.5))
+        found, before, after = reader.again(matcher, maps, method.material)
+        for name, value in zip(history, (np.mean(np.abs(found - maps) > 0.5), before, after), strict=True):
+            history[name].append(value)
+        maps = found
     np.testing.assert_array_equal(estimate.disparity[1], matcher.disparity(maps[1]))
     np.testing.assert_array_equal(estimate.volume.values, consensus(matcher.space, maps))
-    assert estimate.history["changed"] == changed
+    assert estimate.history == history
+
+
+@pytest.mark.parametrize("noise", ["0", "6"])
+@pytest.mark.parametrize("name", ["box", "thin", "fence", "weak", "highlight"])
+def test_a_pass_lowers_the_energy_of_its_costs(name, noise):
+    scene = SYNTHETIC.load(name, {"size": "96x64", "noise": noise}, None)
+    history = Materiality(passes=3).solve(scene, Context(volume=False)).history
+    before, after = np.array(history["energy_before"]), np.array(history["energy"])
+    assert after[0] < before[0]
+    assert (after <= 1.02 * before).all(), "as the docstring says"
 
 
 def test_visibilities_open_before_the_map_and_close_behind_it():
@@ -187,7 +200,8 @@ def test_probe_is_told_every_pass_and_changes_nothing():
     assert silent.history == told.history
     assert set(listener.volumes) == {"similarity/0-2", "similarity/2-4"}
     assert [step for step, *_ in listener.iterations] == [0, 1]
-    assert [energies["changed"] for _, energies, *_ in listener.iterations] == told.history["changed"]
+    for name, values in told.history.items():
+        assert [energies[name] for _, energies, *_ in listener.iterations] == values
     np.testing.assert_array_equal(listener.iterations[-1][2], told.volume.values)
     np.testing.assert_array_equal(listener.iterations[-1][3], told.disparity[2])
     assert (listener.iterations[0][3] != told.disparity[2]).any()

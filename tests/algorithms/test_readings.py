@@ -40,20 +40,24 @@ def test_every_view_is_read_by_the_cost_on_its_own_rays(fineness, pair_steps, ro
         np.testing.assert_allclose(maps, expected, atol=1e-5)
         assert maps.dtype == np.float32
 
-    second = []
+    second, energies = [], []
     for view in range(scene.n):
         cost, mu = Fusion().seen_cost(seen_from(matcher, view), maps)
-        second.append(reader.read(cost + np.float32(0.4) * (1 - mu), scene.views[view]))
+        cost += np.float32(0.4) * (1 - mu)
+        second.append(reader.read(cost, scene.views[view]))
+        energies.append([reader.energy(cost, scene.views[view], planes) for planes in (maps[view], second[-1])])
     expected = mended(matcher, np.stack(second), rounds)
     for threads in (1, 2):
-        np.testing.assert_allclose(reader.again(matcher, maps, 0.4, threads), expected, atol=1e-5)
+        again, *told = reader.again(matcher, maps, 0.4, threads)
+        np.testing.assert_allclose(again, expected, atol=1e-5)
+        np.testing.assert_allclose(told, np.mean(energies, axis=0), rtol=1e-5)
 
 
 @pytest.mark.parametrize("disparity", [-1, 0, 1, 2])
 def test_a_plane_is_found_in_every_view(disparity):
     matcher = moving_plane(disparity=disparity, least=-2)
     maps = Readings().first(matcher)
-    again = Readings().again(matcher, maps, 0.25)
+    again, *_ = Readings().again(matcher, maps, 0.25)
     for planes in (maps, again):
         assert (np.abs(matcher.disparity(planes) - disparity) < 0.5).mean() > 0.97
 

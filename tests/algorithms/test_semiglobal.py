@@ -69,6 +69,36 @@ def test_aggregation_and_winner_are_their_twins(problem, steps):
     np.testing.assert_allclose(winner(other, cost), twin_winner(other, cost), atol=1e-3)
 
 
+def twin_energy(cost, image, planes, small, large, edge):
+    """E pixel by pixel: every pair of the eight neighbours once."""
+    height, width, _ = cost.shape
+    whole = np.rint(planes)
+    table, paid = penalties(small, large, edge), 0.0
+    for y in range(height):
+        for x in range(width):
+            if np.isnan(whole[y, x]):
+                continue
+            paid += np.nan_to_num(cost[y, x, int(whole[y, x])])
+            for y_old, x_old in ((y, x - 1), (y - 1, x - 1), (y - 1, x), (y - 1, x + 1)):
+                if not (y_old >= 0 and 0 <= x_old < width) or np.isnan(whole[y_old, x_old]):
+                    continue
+                step = abs(whole[y, x] - whole[y_old, x_old])
+                contrast = np.abs(image[y, x].astype(int) - image[y_old, x_old]).max()
+                paid += 0 if step == 0 else small if step == 1 else table[contrast]
+    return paid / planes.size
+
+
+@settings(deadline=None, max_examples=30)
+@given(problem=problems(), seed=st.integers(0, 99))
+def test_energy_is_its_twin(problem, seed):
+    cost, image = problem
+    reader, rng = SemiGlobal(small_step=0.1, large_step=0.7, contrast=20.0), np.random.default_rng(seed)
+    planes = rng.uniform(0, cost.shape[2] - 1, cost.shape[:2]).astype(np.float32)
+    planes[rng.random(planes.shape) < 0.1] = np.nan
+    expected = twin_energy(cost, image, planes, 0.1, 0.7, 20.0)
+    np.testing.assert_allclose(reader.energy(cost, image, planes), expected, rtol=1e-5)
+
+
 def test_threads_change_nothing():
     rng = np.random.default_rng(0)
     cost, image = rng.random((20, 30, 9), np.float32), rng.integers(0, 256, (20, 30, 3), dtype=np.uint8)
