@@ -1,9 +1,7 @@
 """Passes over all rows: the energy (equation 5) of a whole scene, its gradient, and steps along it."""
 
-import threading
-
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import fill, helper, kernel
@@ -252,6 +250,7 @@ class Energy:
     along: float
     weights: tuple[NDArray[np.uint8], NDArray[np.uint8]]
     scale: float = 1 / FULL
+    rooms: list[tuple[Floats, ...]] = field(init=False, factory=list)
 
     @property
     def safe_step(self) -> float:
@@ -290,11 +289,8 @@ class Energy:
         beyond = np.empty((-(-space.rows // block) if tied else 0, 2, *now.shape[1:]), now.dtype)
         _border_rows(*extrapolated, block, beyond)
 
-        local = threading.local()
-
         def work(top: int, end: int) -> None:
-            if not hasattr(local, "room"):
-                local.room = _room(space, now.dtype)
+            room = self.rooms.pop() if self.rooms else _room(space, now.dtype)
             _pass_rows(
                 *extrapolated,
                 self.rho,
@@ -314,11 +310,12 @@ class Energy:
                 kind(2 * step / full),
                 top,
                 end,
-                local.room,
+                room,
                 new,
                 slopes,
                 sums,
             )
+            self.rooms.append(room)
 
         over_rows(work, space.rows, threads, block)
         if slopes is not None:
