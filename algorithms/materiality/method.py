@@ -199,14 +199,14 @@ class Materiality(Matching, Readings):
             )
 
         descent = Descent(self.passes, self.optimiser == "fista", energy.safe_step, self.tolerance, threads)
-        mu, history, passes = descent.run(energy, mu, tell if probe.active else None)
+        mu, history, passes, updates = descent.run(energy, mu, tell if probe.active else None)
         return Estimate(
             disparity={self._reference(matcher): matcher.disparity(self._read(matcher, mu, rho, threads))},
             volume=Volume(space, mu, matcher.indices),
             history=history,
             work={
                 "passes": passes,
-                "point_updates": passes * mu.size,
+                "point_updates": updates,
                 "pair_similarities": compared,
             },
         )
