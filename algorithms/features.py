@@ -52,7 +52,8 @@ def _census(wide, fineness, bits):  # type: ignore[no-untyped-def]
 def census(grey: NDArray[np.float32], fineness: int) -> NDArray[np.uint16]:
     """(views, 3, H, samples) census: one bit for each of the 48 pixels around, set where it is darker.
 
-    From above left, row by row, 16 to a word, the first one highest. Neighbours are whole pixels away, `fineness` samples; beyond an edge the nearest sample stands for them.
+    From above left, row by row, 16 to a word, the first one highest. Neighbours are whole pixels
+    away, `fineness` samples; beyond an edge the nearest sample stands for them.
     """
     reach = CENSUS_RADIUS * fineness
     wide = np.pad(grey, ((0, 0), (0, 0), (reach, reach)), mode="edge")

@@ -1,8 +1,9 @@
 """Similarities of windows in one pair of views (SPEC 1), plane by plane and row by row.
 
 Rows of a view are (phases, channels, H, samples) colours, (phases, H, samples) gradients and
-(phases, words, H, samples) census; what is compared at a point is sample `x + ui` of one view with sample `x + uj` of the other. Offsets are
-unsigned: signed ones might count from an array's end, which keeps loops from being vectorised.
+(phases, words, H, samples) census; what is compared at a point is sample `x + ui` of one view with
+sample `x + uj` of the other. Offsets are unsigned: signed ones might count from an array's end, which
+keeps loops from being vectorised.
 """
 
 import numpy as np

@@ -138,7 +138,7 @@ class Descent:
 
 
 class _Told:
-    """What a listener is told about a pass: found in a pass of its own, as one that keeps slopes may round otherwise."""
+    """What a listener is told of a pass: found in a pass of its own, as one that keeps slopes may round otherwise."""
 
     def __init__(self, energy: Energy, mu: Floats, threads: int, listener: Listener):
         self._energy, self._threads, self._listener = energy, threads, listener

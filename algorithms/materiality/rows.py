@@ -66,7 +66,7 @@ def descend_rows(  # type: ignore[no-untyped-def]
         for number in range(len(course)):
             restart = False
             if not state.stopped:
-                if weights is None:
+                if weights is None:  # noqa: SIM108 - the compiler keeps one branch only where there are two
                     edges = None
                 else:
                     edges = weights[0][y : y + 1], weights[1][y : y + 1]
