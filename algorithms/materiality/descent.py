@@ -25,7 +25,8 @@ class Descent:
     step
         Length of a gradient step.
     tolerance
-        Stop when a pass lowers the energy by less than this share; 0 = never.
+        Stop when a pass lowers the energy by less than this share, or that of a row where rows
+        descend on their own; 0 = never.
     threads
         The result does not depend on it.
     """

@@ -72,7 +72,8 @@ class Materiality(Matching, Readings):
         Grey levels of difference over which those ties weaken to 1/e.
     optimiser
         ``fixed_point`` of visibility and materiality, ``gradient`` descent of E, or ``fista``
-        (accelerated, with restarts when E rises).
+        (accelerated, with restarts when E rises). Where nothing couples epipolar planes (`counted` per
+        row and `across` 0), each descends, restarts and stops on its own.
     passes
         Readings of all views after the start, or sweeps over all target points, at most.
     tolerance
