@@ -5,8 +5,10 @@ from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import fill, helper, kernel
 
-CENSUS_RADIUS = 3  # 7x7 pixels: 48 comparisons fit one 64-bit word
+CENSUS_RADIUS = 3  # 7x7 pixels
 CENSUS_BITS = (2 * CENSUS_RADIUS + 1) ** 2 - 1
+WORD = 16  # bits
+CENSUS_WORDS = CENSUS_BITS // WORD
 LUMA = (0.299, 0.587, 0.114)
 
 
@@ -25,33 +27,37 @@ def gradient(grey: NDArray[np.float32], fineness: int) -> NDArray[np.float32]:
 
 @helper
 def _mark_darker(taps, centre, bits):  # type: ignore[no-untyped-def]
-    one = np.uint64(1)
+    one = np.uint16(1)
     for x in range(centre.size):
-        bits[x] = (bits[x] << one) | np.uint64(taps[x] < centre[x])
+        bits[x] = np.uint16(bits[x] << one) | np.uint16(taps[x] < centre[x])
 
 
 @kernel
 def _census(wide, fineness, bits):  # type: ignore[no-untyped-def]
-    views, height, samples = bits.shape
+    views, _, height, samples = bits.shape
     for i in range(views):
         for y in range(height):
+            number = 0
             for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
                 row = wide[i, min(max(y + dy, 0), height - 1)]
                 middle = CENSUS_RADIUS * fineness
                 centre = wide[i, y, middle : middle + samples]
                 for dx in range(2 * CENSUS_RADIUS + 1):
                     if dy != 0 or dx != CENSUS_RADIUS:
-                        _mark_darker(row[dx * fineness : dx * fineness + samples], centre, bits[i, y])
+                        taps = row[dx * fineness : dx * fineness + samples]
+                        _mark_darker(taps, centre, bits[i, number // WORD, y])
+                        number += 1
 
 
-def census(grey: NDArray[np.float32], fineness: int) -> NDArray[np.uint64]:
-    """(views, H, samples) census: one bit for each of the 48 pixels around, set where it is darker.
+def census(grey: NDArray[np.float32], fineness: int) -> NDArray[np.uint16]:
+    """(views, 3, H, samples) census: one bit for each of the 48 pixels around, set where it is darker.
 
-    Neighbours are whole pixels away, `fineness` samples; beyond an edge the nearest sample stands for them.
+    From above left, row by row, 16 to a word, the first one highest. Neighbours are whole pixels
+    away, `fineness` samples; beyond an edge the nearest sample stands for them.
     """
     reach = CENSUS_RADIUS * fineness
     wide = np.pad(grey, ((0, 0), (0, 0), (reach, reach)), mode="edge")
-    bits = np.zeros(grey.shape, np.uint64)
+    bits = np.zeros((len(grey), CENSUS_WORDS, *grey.shape[1:]), np.uint16)
     _census(wide, fineness, bits)
     return bits
 
@@ -64,18 +70,19 @@ def _widen(taps, centre, most, gap):  # type: ignore[no-untyped-def]
 
 @helper
 def _push(gap, near, bits):  # type: ignore[no-untyped-def]
-    one, zero = np.uint64(1), np.float32(0)
+    one, zero = np.uint16(1), np.float32(0)
     for x in range(bits.size):
-        bits[x] = (bits[x] << one) | np.uint64(near or gap[x] <= zero)
+        bits[x] = np.uint16(bits[x] << one) | np.uint16(near or gap[x] <= zero)
 
 
 @kernel
 def _alike(wide, fineness, most, bits):  # type: ignore[no-untyped-def]
-    views, height, samples = bits.shape
+    views, _, height, samples = bits.shape
     middle = CENSUS_RADIUS * fineness
     gap = np.empty(samples, np.float32)
     for i in range(views):
         for y in range(height):
+            number = 0
             for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
                 other = min(max(y + dy, 0), height - 1)
                 for dx in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
@@ -90,11 +97,12 @@ def _alike(wide, fineness, most, bits):  # type: ignore[no-untyped-def]
                             most,
                             gap,
                         )
-                    _push(gap, abs(dx) <= 1 and abs(dy) <= 1, bits[i, y])
+                    _push(gap, abs(dx) <= 1 and abs(dy) <= 1, bits[i, number // WORD, y])
+                    number += 1
 
 
-def alike(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.uint64]:
-    """(views, H, samples) which of the pixels of a census are likely on the same surface as the middle one.
+def alike(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.uint16]:
+    """(views, 3, H, samples) which of the pixels of a census are likely on the same surface as the middle one.
 
     A bit is set for the eight next to it, and where no channel differs by more than `most` grey
     levels. What lies across a depth jump moves on its own between views and says nothing about the
@@ -107,6 +115,6 @@ def alike(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.u
     """
     reach = CENSUS_RADIUS * fineness
     wide = np.pad(rows, ((0, 0), (0, 0), (0, 0), (reach, reach)), mode="edge")
-    bits = np.zeros((rows.shape[0], *rows.shape[2:]), np.uint64)
+    bits = np.zeros((len(rows), CENSUS_WORDS, *rows.shape[2:]), np.uint16)
     _alike(wide, fineness, np.float32(most), bits)
     return bits

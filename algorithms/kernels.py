@@ -5,10 +5,12 @@ from typing import Any
 from numba import njit
 from numba.extending import intrinsic
 
-# the flags let sums vectorise and keep NaN and infinity honest; no kernel is a callback of C
+# the flags let sums vectorise and keep NaN and infinity honest; x / 0 is what it is to NumPy, as a loop
+# that may raise does not vectorise; no kernel is a callback of C
 OPTIONS: dict[str, Any] = {
     "nogil": True,
     "cache": True,
+    "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "nsz"},
     "no_cfunc_wrapper": True,
 }

@@ -18,8 +18,9 @@ from matbench.space import DisparitySpace
 
 PairSet = Literal["all", "consecutive", "reference"]
 Form = Literal["ssd", "rms", "linear", "census", "mixed"]
-# (views, phases, channels, H, samples) colours or luma, (views, phases, H, samples) gradients, census, alike pixels
-Features = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint64], NDArray[np.uint64]]
+# (views, phases, channels, H, samples) colours or luma, (views, phases, H, samples) gradients,
+# (views, phases, words, H, samples) census, alike pixels
+Features = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint16], NDArray[np.uint16]]
 
 
 def pairs(views: int, which: PairSet, ref: int = 0) -> NDArray[np.int64]:
@@ -95,9 +96,10 @@ class Matcher:
         (pairs, 2) pairs of chosen views, left one first.
     rows
         (views, channels, H, samples) float32 rows sampled at the space's fineness: colours, or luma.
-    slopes, bits, alike
-        (views, H, samples) horizontal gradients and census of the luma, and which pixels of the census
-        are like its middle; no rows where nothing reads them.
+    slopes
+        (views, H, samples) horizontal gradients of the luma; no rows where nothing reads them.
+    bits, alike
+        (views, words, H, samples) census of the luma, and which of its pixels are like its middle.
     settings
         How windows are compared.
     """
@@ -108,8 +110,8 @@ class Matcher:
     pairs: NDArray[np.int64]
     rows: NDArray[np.float32]
     slopes: NDArray[np.float32]
-    bits: NDArray[np.uint64]
-    alike: NDArray[np.uint64]
+    bits: NDArray[np.uint16]
+    alike: NDArray[np.uint16]
     settings: Matching
 
     @classmethod

@@ -1,13 +1,14 @@
 """Similarities of windows in one pair of views (SPEC 1), plane by plane and row by row.
 
-Rows of a view are (phases, channels, H, samples) colours, (phases, H, samples) gradients and census; what
-is compared at a point is sample `x + ui` of one view with sample `x + uj` of the other. Offsets are
-unsigned: signed ones might count from an array's end, which keeps loops from being vectorised.
+Rows of a view are (phases, channels, H, samples) colours, (phases, H, samples) gradients and
+(phases, words, H, samples) census; what is compared at a point is sample `x + ui` of one view with
+sample `x + uj` of the other. Offsets are unsigned: signed ones might count from an array's end, which
+keeps loops from being vectorised.
 """
 
 import numpy as np
 
-from matbench.algorithms.features import CENSUS_BITS
+from matbench.algorithms.features import CENSUS_BITS, CENSUS_WORDS
 from matbench.algorithms.kernels import fill, helper, kernel, popcount
 
 FULL = 255  # a stored similarity of 1: similarities are kept in one byte
@@ -31,57 +32,59 @@ def square_difference(left, right, fi, ui, fj, uj, row, channels, limit, out):  
 
 
 @helper
-def _differing(a, b):  # type: ignore[no-untyped-def]
-    """How many of the 48 bits of two census words differ."""
-    return np.float32(np.int32(popcount(a ^ b)))
-
-
-@helper
-def _differing_among(a, b, alike):  # type: ignore[no-untyped-def]
-    """How many of 48 bits would differ, were all as those that are set in `alike`."""
-    return (
-        np.float32(CENSUS_BITS)
-        * np.float32(np.int32(popcount((a ^ b) & alike)))
-        / np.float32(np.int32(popcount(alike)))
-    )
-
-
-@helper
-def _census_difference(left, right, left_alike, right_alike, fi, ui, fj, uj, row, masked, out):  # type: ignore[no-untyped-def]
-    """out = min(h, 20) / 20, with h how many bits differ."""
-    share, most = np.float32(1 / ORDER_SPAN), np.float32(ORDER_SPAN)
-    for x in range(np.uintp(out.size)):
+def _count_differing(left, right, fi, ui, fj, uj, row, differing):  # type: ignore[no-untyped-def]
+    """How many of the census bits of two pixels differ; here and below words are short, so that many fit a vector."""
+    for x in range(np.uintp(differing.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
+        count = np.uint16(0)
+        for word in range(CENSUS_WORDS):
+            count = np.uint16(count + popcount(np.uint16(left[fi, word, row, i] ^ right[fj, word, row, j])))
+        differing[x] = count
+
+
+@helper
+def _count_differing_among(  # type: ignore[no-untyped-def]
+    left, right, left_alike, right_alike, fi, ui, fj, uj, row, differing, compared
+):
+    """How many bits differ among those that are set in both `alike`, and how many these are."""
+    for x in range(np.uintp(differing.size)):
+        i, j = x + np.uintp(ui), x + np.uintp(uj)
+        differ, among = np.uint16(0), np.uint16(0)
+        for word in range(CENSUS_WORDS):
+            both = np.uint16(left_alike[fi, word, row, i] & right_alike[fj, word, row, j])
+            unlike = np.uint16((left[fi, word, row, i] ^ right[fj, word, row, j]) & both)
+            differ, among = np.uint16(differ + popcount(unlike)), np.uint16(among + popcount(both))
+        differing[x], compared[x] = differ, among
+
+
+@helper
+def _census_difference(differing, compared, masked, out):  # type: ignore[no-untyped-def]
+    """out = min(h, 20) / 20, with h how many of 48 bits differ, or would, were all as those compared."""
+    share, most, bits = np.float32(1 / ORDER_SPAN), np.float32(ORDER_SPAN), np.float32(CENSUS_BITS)
+    for x in range(np.uintp(out.size)):
+        differ = np.float32(differing[x])
         if len(masked) > 0:
-            differ = _differing_among(
-                left[fi, row, i], right[fj, row, j], left_alike[fi, row, i] & right_alike[fj, row, j]
-            )
-        else:
-            differ = _differing(left[fi, row, i], right[fj, row, j])
+            differ = bits * differ / np.float32(compared[x])
         out[x] = share * min(differ, most)
 
 
 @helper
 def _mixed_difference(  # type: ignore[no-untyped-def]
-    left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike,
-    fi, ui, fj, uj, row, masked, channels, limit, out,
-):  # fmt: skip
+    left, right, left_slope, right_slope, differing, compared, fi, ui, fj, uj, row, masked, channels, limit, out
+):
     """out = the cost of ``mixed`` at every pixel, between 0 and 1 unless `limit` allows more."""
     colour, slope = np.float32(COLOUR / COLOUR_SPAN / len(channels)), np.float32(SLOPE / SLOPE_SPAN)
     order, steepest = np.float32(ORDER / ORDER_SPAN), np.float32(SLOPE_SPAN)
-    most, zero = np.float32(ORDER_SPAN), np.float32(0)
+    most, zero, bits = np.float32(ORDER_SPAN), np.float32(0), np.float32(CENSUS_BITS)
     for x in range(np.uintp(out.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
         total = zero
         for c in range(len(channels)):
             total += abs(left[fi, c, row, i] - right[fj, c, row, j])
         steep = abs(left_slope[fi, row, i] - right_slope[fj, row, j])
+        differ = np.float32(differing[x])
         if len(masked) > 0:
-            differ = _differing_among(
-                left_bits[fi, row, i], right_bits[fj, row, j], left_alike[fi, row, i] & right_alike[fj, row, j]
-            )
-        else:
-            differ = _differing(left_bits[fi, row, i], right_bits[fj, row, j])
+            differ = bits * differ / np.float32(compared[x])
         out[x] = colour * min(total, limit) + slope * min(steep, steepest) + order * min(differ, most)
 
 
@@ -178,6 +181,7 @@ def pair_rows(  # type: ignore[no-untyped-def]
     ring = np.zeros((TILE, side, samples), np.float32)
     weights = np.empty((TILE, samples), np.float32)
     column = np.zeros(samples + 2 * reach, np.float32)
+    differing, compared = np.empty(samples, np.uint16), np.empty(samples, np.uint16)
     zero = np.float32(0)
     for nearest in range(TILE, out.shape[2] + TILE, TILE):
         tile = range(nearest - TILE, min(nearest, out.shape[2]))
@@ -197,15 +201,21 @@ def pair_rows(  # type: ignore[no-untyped-def]
                     fill(zero, cost)
                 elif measure == SQUARES:
                     square_difference(left, right, fi, ui, fj, uj, row, channels, limit, cost)
-                elif measure == CENSUS:
-                    _census_difference(
-                        left_bits, right_bits, left_alike, right_alike, fi, ui, fj, uj, row, masked, cost
-                    )
                 else:
-                    _mixed_difference(
-                        left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike,
-                        fi, ui, fj, uj, row, masked, channels, limit, cost,
-                    )  # fmt: skip
+                    differ, among = differing[:width], compared[:width]
+                    if len(masked) > 0:
+                        _count_differing_among(
+                            left_bits, right_bits, left_alike, right_alike, fi, ui, fj, uj, row, differ, among
+                        )
+                    else:
+                        _count_differing(left_bits, right_bits, fi, ui, fj, uj, row, differ)
+                    if measure == CENSUS:
+                        _census_difference(differ, among, masked, cost)
+                    else:
+                        _mixed_difference(
+                            left, right, left_slope, right_slope, differ, among, fi, ui, fj, uj, row, masked, channels,
+                            limit, cost,
+                        )  # fmt: skip
                 if y < y0:
                     continue
                 _sum_rows(near, taps, column[reach : reach + width])

@@ -1,14 +1,15 @@
-"""Minimising the energy (equation 5): projected gradient, plain or accelerated, over all rows at once."""
+"""Minimising the energy (equation 5): projected gradient, plain or accelerated."""
 
 from collections.abc import Callable
-from math import sqrt
 
 import numpy as np
 from attrs import frozen
 
 from matbench.algorithms.materiality.passes import Energy, Floats
+from matbench.algorithms.materiality.rows import RISE as RISE
+from matbench.algorithms.materiality.rows import ROW, descend_rows, follow
 
-RISE = 1e-6  # but at a restart, the energy exceeds that of the pass before by at most this share
+Listener = Callable[[int, dict[str, float], Floats, Floats], None]
 
 
 @frozen(eq=False)
@@ -24,7 +25,8 @@ class Descent:
     step
         Length of a gradient step.
     tolerance
-        Stop when a pass lowers the energy by less than this share; 0 = never.
+        Stop when a pass lowers the energy by less than this share, or that of a row where rows
+        descend on their own; 0 = never.
     threads
         The result does not depend on it.
     """
@@ -36,21 +38,19 @@ class Descent:
     threads: int = 1
 
     def run(
-        self,
-        energy: Energy,
-        mu: Floats,
-        listener: Callable[[int, dict[str, float], Floats, Floats], None] | None = None,
-    ) -> tuple[Floats, dict[str, list[float]], int]:
+        self, energy: Energy, mu: Floats, listener: Listener | None = None
+    ) -> tuple[Floats, dict[str, list[float]], int, int]:
         """Descend from `mu`, which is overwritten.
 
         An accelerated pass whose energy exceeds that of the last accepted pass is rejected: the
         next one starts without momentum. If the energy rises even so, the step is halved and the
-        point is accepted as a restart.
+        point is accepted as a restart. Where nothing couples rows, every row does so on its own.
 
         Parameters
         ----------
         listener
-            Is told pass, energies, materialities and their derivative after every accepted pass.
+            Is told pass, energies, and where the gradient was taken the materialities and their
+            derivative.
 
         Returns
         -------
@@ -58,42 +58,100 @@ class Descent:
             (rows, planes, columns) materialities after the last step.
         history
             Per accepted pass the energies where its gradient was taken, and ``restart`` = 1 for
-            the passes from which on the energy is compared anew; else 0.
+            the passes from which on the energy is compared anew; else 0. Where nothing couples rows,
+            per pass the sums over them, with what the last accepted pass of each came to.
         passes
-            How many passes were made, rejected ones included.
+            How many passes were made, rejected ones included; the most of any row.
+        updates
+            How many points all of them stepped.
         """
+        told = None if listener is None else _Told(energy, mu, self.threads, listener)
+        return self._row_by_row(energy, mu, told) if energy.uncoupled else self._all_rows(energy, mu, told)
+
+    def _all_rows(
+        self, energy: Energy, mu: Floats, told: "_Told | None"
+    ) -> tuple[Floats, dict[str, list[float]], int, int]:
         # a pass steps into the materialities of the pass before, which nothing reads any more
         now, before = mu, np.empty_like(mu)
-        told = None if listener is None else (np.empty_like(mu), np.empty_like(mu), np.empty_like(mu))
         history: dict[str, list[float]] = {}
         last, momentum, beta, step = np.inf, 1.0, 0.0, self.step
         made = 0
         while made < self.passes:
             made += 1
             if told is not None:
-                at, slopes, unused = told
-                np.copyto(at, np.clip(now + mu.dtype.type(beta) * (now - before), 0, 1) if beta else now)
-                # a pass of its own, as one that keeps slopes may be compiled to round otherwise
-                energy.step(now, before, beta, step, unused, slopes, self.threads)
+                told.look(now, before, np.array(beta))
             energies = energy.step(now, before, beta, step, before, None, self.threads)
-            rises = energies["total"] > last * (1 + RISE)
-            if rises and beta > 0:
-                momentum, beta = 1.0, 0.0
+            total = energies["total"]
+            accepted, restart, momentum, beta, step = follow(total, last, momentum, beta, step, self.accelerated)
+            if not accepted:
                 continue
-            energies["restart"] = float(rises)
-            if rises:
-                step /= 2
+            energies["restart"] = float(restart)
             for name, value in energies.items():
                 history.setdefault(name, []).append(value)
-            if listener is not None and told is not None:
-                at, slopes, _ = told
-                listener(len(history["total"]) - 1, energies, at, slopes)
-            gained = last - energies["total"]
-            last = energies["total"]
+            if told is not None:
+                told.tell(len(history["total"]) - 1, energies)
+            gained, last = last - total, total
             now, before = before, now
-            if self.tolerance and 0 <= gained < self.tolerance * last:
+            if self.tolerance and 0 <= gained < self.tolerance * total:
                 break
-            if self.accelerated:
-                grown = (1 + sqrt(1 + 4 * momentum * momentum)) / 2
-                momentum, beta = grown, (momentum - 1) / grown
-        return now, history, made
+        return now, history, made, made * mu.size
+
+    def _row_by_row(
+        self, energy: Energy, mu: Floats, told: "_Told | None"
+    ) -> tuple[Floats, dict[str, list[float]], int, int]:
+        kind, before = mu.dtype.type, np.zeros_like(mu)
+        states = np.zeros(len(mu), ROW)
+        states["data"], states["momentum"], states["step"] = np.inf, 1, self.step
+        at_once = 1 if told is not None else self.passes
+        history: dict[str, list[float]] = {}
+        terms, full = energy.terms(kind), 1 / energy.scale
+        for first in range(0, self.passes, max(1, at_once)):
+            if states["stopped"].all():
+                break
+            if told is not None:
+                told.look(mu, before, states["beta"])
+            course = np.empty((at_once, 4, len(mu)))
+
+            def work(top: int, end: int, room: tuple[Floats, ...], course: Floats = course) -> None:
+                descend_rows(
+                    mu, before, kind(1), *terms, energy.pressure * full / 2, energy.target,
+                    self.accelerated, self.tolerance, top, end, room, states, course,
+                )  # fmt: skip
+
+            energy.over_rows(work, kind, self.threads)
+            for number, (data, count, adjacent, restart) in enumerate(course.sum(axis=2).tolist(), first):
+                if number >= states["made"].max():
+                    break
+                energies = {
+                    "total": data + count + adjacent,
+                    "data": data,
+                    "smooth": count + adjacent,
+                    "count": count,
+                    "adjacent": adjacent,
+                    "restart": float(restart > 0),
+                }
+                for name, value in energies.items():
+                    history.setdefault(name, []).append(value)
+                if told is not None:
+                    told.tell(number, energies)
+        made = states["made"]
+        return mu, history, int(made.max()), int(made.sum()) * mu[0].size
+
+
+class _Told:
+    """What a listener is told of a pass: found in a pass of its own, as one that keeps slopes may round otherwise."""
+
+    def __init__(self, energy: Energy, mu: Floats, threads: int, listener: Listener):
+        self._energy, self._threads, self._listener = energy, threads, listener
+        self._at, self._slopes, self._unused = np.empty_like(mu), np.empty_like(mu), np.empty_like(mu)
+
+    def look(self, now: Floats, before: Floats, beta: Floats) -> None:
+        """At now + beta (now - before), with one beta or one for every row."""
+        beta = np.broadcast_to(beta.astype(now.dtype), len(now))[:, None, None]
+        with np.errstate(invalid="ignore"):  # without momentum, nothing is known about the pass before
+            at = np.clip(now + beta * (now - before), 0, 1)
+        np.copyto(self._at, np.where(beta > 0, at, now))
+        self._energy.step(self._at, self._at, 0.0, 0.0, self._unused, self._slopes, self._threads)
+
+    def tell(self, number: int, energies: dict[str, float]) -> None:
+        self._listener(number, energies, self._at, self._slopes)

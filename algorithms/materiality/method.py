@@ -72,7 +72,8 @@ class Materiality(Matching, Readings):
         Grey levels of difference over which those ties weaken to 1/e.
     optimiser
         ``fixed_point`` of visibility and materiality, ``gradient`` descent of E, or ``fista``
-        (accelerated, with restarts when E rises).
+        (accelerated, with restarts when E rises). Where nothing couples epipolar planes (`counted` per
+        row and `across` 0), each descends, restarts and stops on its own.
     passes
         Readings of all views after the start, or sweeps over all target points, at most.
     tolerance
@@ -199,14 +200,14 @@ class Materiality(Matching, Readings):
             )
 
         descent = Descent(self.passes, self.optimiser == "fista", energy.safe_step, self.tolerance, threads)
-        mu, history, passes = descent.run(energy, mu, tell if probe.active else None)
+        mu, history, passes, updates = descent.run(energy, mu, tell if probe.active else None)
         return Estimate(
             disparity={self._reference(matcher): matcher.disparity(self._read(matcher, mu, rho, threads))},
             volume=Volume(space, mu, matcher.indices),
             history=history,
             work={
                 "passes": passes,
-                "point_updates": passes * mu.size,
+                "point_updates": updates,
                 "pair_similarities": compared,
             },
         )

@@ -1,9 +1,9 @@
 """Passes over all rows: the energy (equation 5) of a whole scene, its gradient, and steps along it."""
 
-import threading
+from collections.abc import Callable
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import fill, helper, kernel
@@ -88,7 +88,7 @@ def _match_pairs(mu, seen, rho, k, pairs, slide, origin, samples, full, pulls): 
 
 
 def _room(space: DisparitySpace, kind: np.dtype[np.floating]) -> tuple[Floats, ...]:
-    """Workspace of `_pass_rows`, which any thread needs once.
+    """Workspace of `pass_rows`, which any thread needs once.
 
     Returns
     -------
@@ -117,9 +117,9 @@ def _room(space: DisparitySpace, kind: np.dtype[np.floating]) -> tuple[Floats, .
 
 
 @kernel
-def _pass_rows(  # type: ignore[no-untyped-def]
-    now, before, beta, one, rho, full, views, pairs, links, rest, samples, first, origin, pressure, target, bias,
-    weights, across, along, beyond, step, top, end, room, new, slopes, sums,
+def pass_rows(  # type: ignore[no-untyped-def]
+    now, before, beta, one, rho, full, views, pairs, links, rest, samples, first, origin, weights, across, along,
+    pressure, target, bias, beyond, step, top, end, room, new, slopes, sums,
 ):  # fmt: skip
     """One pass over rows top..end: energies and gradient at the extrapolated point, and the step.
 
@@ -134,12 +134,12 @@ def _pass_rows(  # type: ignore[no-untyped-def]
         One of them, the others None: (pairs, 2) views of each pair; or, where pairs are
         consecutive, a tuple as long as there are pairs, which are taken in one loop; or one as long
         as the pairs that are left when loops have taken LINKS at a time.
-    pressure, target, bias
-        The count term's derivative in a row is pressure (sum - target) + bias.
     weights
         Edge weights down and right as from `edge_weights`, or None: no ties.
     across, along
         lambda_y and lambda_x for one unit of weight.
+    pressure, target, bias
+        The count term's derivative in a row is pressure (sum - target) + bias.
     beyond
         (2, planes, columns) the point in the rows top - 1 and end; not read without ties.
     room
@@ -252,6 +252,7 @@ class Energy:
     along: float
     weights: tuple[NDArray[np.uint8], NDArray[np.uint8]]
     scale: float = 1 / FULL
+    rooms: list[tuple[Floats, ...]] = field(init=False, factory=list)
 
     @property
     def safe_step(self) -> float:
@@ -260,12 +261,45 @@ class Energy:
         counting = 2 * self.count * planes * columns / self.target
         return 1 / (counting + 8 * (self.across + self.along) + 2 * len(self.pairs))
 
-    def _taken(self, tied: bool) -> tuple[NDArray[np.int64] | None, tuple[int, ...] | None, tuple[int, ...] | None]:
-        """`pairs`, `links` and `rest` of `_pass_rows`."""
+    @property
+    def tied(self) -> bool:
+        """Whether adjacent points are."""
+        return self.across > 0 or self.along > 0
+
+    @property
+    def uncoupled(self) -> bool:
+        """Whether no term has points of several rows."""
+        return self.per_row and not self.across
+
+    @property
+    def pressure(self) -> float:
+        """The count term's derivative is this times what there is in excess of N."""
+        return 2 * self.count / self.target
+
+    def terms(self, kind: type[np.floating]) -> tuple[object, ...]:
+        """`rho` to `along` of `pass_rows`."""
+        space, full = self.space, 1 / self.scale
+        ties = self.weights if self.tied else None, kind(self.across * full / FULL), kind(self.along * full / FULL)
+        return self.rho, kind(full), space.views, *self._taken(), space.samples, space.first, space.origin, *ties
+
+    def over_rows(
+        self, work: Callable[[int, int, tuple[Floats, ...]], None], kind: type[np.floating], threads: int
+    ) -> None:
+        """Call ``work(top, end, room)`` for blocks of rows; a workspace outlives its pass."""
+
+        def borrow(top: int, end: int) -> None:
+            room = self.rooms.pop() if self.rooms else _room(self.space, np.dtype(kind))
+            work(top, end, room)
+            self.rooms.append(room)
+
+        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))
+
+    def _taken(self) -> tuple[NDArray[np.int64] | None, tuple[int, ...] | None, tuple[int, ...] | None]:
+        """`pairs`, `links` and `rest` of `pass_rows`."""
         steps = np.arange(self.space.views - 1)
         if not np.array_equal(self.pairs, np.stack([steps, steps + 1], axis=1)):
             return self.pairs, None, None
-        if len(steps) <= LINKS and not tied:
+        if len(steps) <= LINKS and not self.tied:
             return None, (0,) * len(steps), None
         return None, None, (0,) * ((len(steps) - 1) % LINKS + 1)
 
@@ -279,48 +313,35 @@ class Energy:
         """
         space, kind = self.space, now.dtype.type
         extrapolated = now, before, kind(beta), kind(1)
-        pressure, full, block = 2 * self.count / self.target, 1 / self.scale, share(space.rows, threads)
+        full, block = 1 / self.scale, share(space.rows, threads)
         sums = np.empty((space.rows, 3))
         bias = 0.0
         if not self.per_row:
             over_rows(lambda top, end: _count_rows(*extrapolated, top, end, sums[:, 2]), space.rows, threads, block)
-            bias = pressure * (float(sums[:, 2].sum()) / space.rows - self.target)
-        tied = self.across > 0 or self.along > 0
+            bias = self.pressure * (float(sums[:, 2].sum()) / space.rows - self.target)
         # rows are overwritten in place: what their neighbours in other blocks read is set aside
-        beyond = np.empty((-(-space.rows // block) if tied else 0, 2, *now.shape[1:]), now.dtype)
+        beyond = np.empty((-(-space.rows // block) if self.tied else 0, 2, *now.shape[1:]), now.dtype)
         _border_rows(*extrapolated, block, beyond)
+        terms = self.terms(kind)
 
-        local = threading.local()
-
-        def work(top: int, end: int) -> None:
-            if not hasattr(local, "room"):
-                local.room = _room(space, now.dtype)
-            _pass_rows(
+        def work(top: int, end: int, room: tuple[Floats, ...]) -> None:
+            pass_rows(
                 *extrapolated,
-                self.rho,
-                kind(full),
-                space.views,
-                *self._taken(tied),
-                space.samples,
-                space.first,
-                space.origin,
-                pressure * full / 2 if self.per_row else 0.0,
+                *terms,
+                self.pressure * full / 2 if self.per_row else 0.0,
                 self.target,
                 bias * full / 2,
-                self.weights if tied else None,
-                kind(self.across * full / FULL),
-                kind(self.along * full / FULL),
-                beyond[top // block] if tied else now[:2],
+                beyond[top // block] if self.tied else now[:2],
                 kind(2 * step / full),
                 top,
                 end,
-                local.room,
+                room,
                 new,
                 slopes,
                 sums,
             )
 
-        over_rows(work, space.rows, threads, block)
+        self.over_rows(work, kind, threads)
         if slopes is not None:
             slopes *= kind(2 / full)
         data, adjacent, total = (float(part) for part in sums.sum(axis=0) / (full * full, full, 1))

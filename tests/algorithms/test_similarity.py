@@ -143,10 +143,10 @@ def test_similarity_is_its_equation(
 def test_alike_is_what_is_near_or_of_a_colour(shape, fineness, most, seed):
     rows = np.random.default_rng(seed).integers(-3, 4, shape).astype(np.float32)
     bits = alike(rows, fineness, most)
-    assert bits.shape == (shape[0], *shape[2:])
-    for view, y, x in np.ndindex(bits.shape):
+    assert bits.shape == (shape[0], 3, *shape[2:])
+    for view, y, x in np.ndindex(shape[0], *shape[2:]):
         like = np.delete(same_surface(rows[view], y, x, fineness, most).ravel(), 24)
-        assert f"{int(bits[view, y, x]):048b}" == "".join(map(str, like.astype(int)))
+        assert "".join(f"{word:016b}" for word in bits[view, :, y, x]) == "".join(map(str, like.astype(int)))
 
 
 def test_blocks_and_threads_give_the_same():

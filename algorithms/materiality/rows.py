@@ -1,0 +1,95 @@
+"""Descent of the energy where nothing couples rows: all passes over one while it is in the cache, then the next."""
+
+import numpy as np
+
+from matbench.algorithms.kernels import kernel
+from matbench.algorithms.materiality.passes import pass_rows
+
+RISE = 1e-6  # but at a restart, an energy exceeds that of the pass before by at most this share
+
+# of one row: the parts of its energy after the last accepted pass, how the next pass goes on, passes made
+ROW = np.dtype([(name, np.float64) for name in ("data", "count", "adjacent", "momentum", "beta", "step")] + [
+    ("stopped", np.int64), ("made", np.int64),
+])  # fmt: skip
+
+
+@kernel
+def follow(total, last, momentum, beta, step, accelerated):  # type: ignore[no-untyped-def]
+    """What follows a pass whose energy is `total`, if that of the last accepted pass is `last`.
+
+    A rise beyond rounding rejects a pass with momentum, and the next one goes without; without
+    momentum it halves the step, and energies are compared anew.
+
+    Returns
+    -------
+    accepted, restart
+        Whether the pass counts, and whether it is one from which on energies are compared anew.
+    momentum, beta, step
+        Of the next pass; see `Descent`.
+    """
+    rises = total > last * (1 + RISE)
+    if rises and beta > 0:
+        return False, False, 1.0, 0.0, step
+    if rises:
+        step /= 2
+    if accelerated:
+        grown = (1 + np.sqrt(1 + 4 * momentum * momentum)) / 2
+        momentum, beta = grown, (momentum - 1) / grown
+    return True, rises, momentum, beta, step
+
+
+@kernel
+def descend_rows(  # type: ignore[no-untyped-def]
+    now, before, one, rho, full, views, pairs, links, rest, samples, first, origin, weights, across, along,
+    pressure, target, accelerated, tolerance, top, end, room, states, course,
+):  # fmt: skip
+    """Passes over rows top..end, each row with a step and restarts of its own.
+
+    Parameters
+    ----------
+    now, before, rho ... room
+        As in `pass_rows`; the first two are overwritten with those after the last pass.
+    accelerated, tolerance
+        As in `Descent`; the latter is asked of a row's energy.
+    states
+        (rows,) ROW: where each row's descent has come to.
+    course
+        (passes, 4, rows), overwritten: data, count and adjacent energy of a row at its last accepted
+        pass so far, and 1 for a restart, else 0.
+    """
+    kind, unit = now.dtype.type, np.float64(full)
+    count = pressure / unit  # lambda / N, as the pressure is full / 2 of the derivative
+    sums = np.empty((1, 3))
+    for y in range(top, end):
+        state, a, b = states[y], now[y : y + 1], before[y : y + 1]
+        turned = False
+        for number in range(len(course)):
+            restart = False
+            if not state.stopped:
+                if weights is None:  # noqa: SIM108 - the compiler keeps one branch only where there are two
+                    edges = None
+                else:
+                    edges = weights[0][y : y + 1], weights[1][y : y + 1]
+                pass_rows(
+                    a, b, kind(state.beta), one, rho[y : y + 1], full, views, pairs, links, rest, samples, first,
+                    origin, edges, across, along, pressure, target, 0.0, a, kind(2 * state.step / unit), 0, 1, room,
+                    b, None, sums,
+                )  # fmt: skip
+                data, ties, excess = sums[0, 0] / (unit * unit), sums[0, 1] / unit, sums[0, 2] - target
+                counted = count * excess * excess
+                last, total = state.data + state.count + state.adjacent, data + counted + ties
+                accepted, restart, state.momentum, state.beta, state.step = follow(
+                    total, last, state.momentum, state.beta, state.step, accelerated
+                )
+                state.made += 1
+                if accepted:
+                    state.data, state.count, state.adjacent = data, counted, ties
+                    state.stopped = tolerance > 0 and 0 <= last - total < tolerance * total
+                    a, b = b, a
+                    turned = not turned
+            course[number, 0, y], course[number, 1, y] = state.data, state.count
+            course[number, 2, y], course[number, 3, y] = state.adjacent, restart
+        if turned:
+            for k in range(now.shape[1]):
+                for x in range(now.shape[2]):
+                    now[y, k, x], before[y, k, x] = before[y, k, x], now[y, k, x]
