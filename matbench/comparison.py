@@ -14,7 +14,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from matbench import plugins, run, scoring, spec
+from matbench import limits, plugins, run, scoring, spec
 from matbench._version import __version__
 from matbench.dataset import Listing
 from matbench.errors import UserError, unknown
@@ -144,7 +144,7 @@ def machine() -> dict[str, str]:
         **{name: version(name) for name in libraries},
         "system": f"{platform.system()} {platform.machine()}",
         "processor": _processor(),
-        "threads": str(run.threads()),
+        "threads": str(limits.cores()),
     }
 
 
