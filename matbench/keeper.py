@@ -7,8 +7,8 @@ and ends all below it, as soon as nobody holds the other end of its line, so not
 """
 
 import os
+import shutil
 import signal
-import sys
 import time
 from collections.abc import Iterable
 from contextlib import suppress
@@ -81,6 +81,7 @@ class Child:
     pid: int
     line: Connection
     output: int
+    is_fit: bool = True
 
     @classmethod
     def fork(cls, job: Job, inbox: Connection) -> "Child":
@@ -103,9 +104,7 @@ class Child:
         os.set_blocking(output, False)
         return cls(pid, line, output)
 
-    def end(self) -> None:
-        """End it, with everything below the keeper."""
-        processes.end_all_below()
+    def close(self) -> None:
         self.line.close()
         os.close(self.output)
 
@@ -124,7 +123,7 @@ def keep(inbox: Connection) -> None:
                 said = ""
             except (OSError, ValueError) as error:  # the disk is full, say
                 processes.end_all_below()
-                child, said = None, f"{type(error).__name__}: {error}"
+                child, said = None, str(error)
             inbox.send(said)
     except (EOFError, BrokenPipeError, ConnectionResetError, Dismissed):
         pass
@@ -136,28 +135,43 @@ def _cell(job: Job, inbox: Connection, child: Child | None) -> Child | None:
     """Solve a cell; the child, if it is to solve the next one, too."""
     store = Store(job.run)
     with store.building(job.cell) as draft:
-        child = child or Child.fork(job, inbox)
-        log = Log(child.output)
-        try:
-            outcome = _watch(job, draft.resolve(), inbox, child, log)
-        except Dismissed:
-            child.end()
-            raise
-        if outcome is None and job.settings.isolation == "shared":
-            stays = True
-            log.drain()
-        else:
-            stays = False
+        if child is not None:
+            stays = _attempt(job, draft.resolve(), inbox, child)
+            if stays or stays is None:
+                return child if stays else None
+            _empty(draft)  # what went before may be to blame: once more, in a fresh process
+        child = Child.fork(job, inbox)
+        return child if _attempt(job, draft.resolve(), inbox, child) else None
+
+
+def _attempt(job: Job, draft: Path, inbox: Connection, child: Child) -> bool | None:
+    """Fill a cell's folder; whether the child is fit for another cell, None where it took too long.
+
+    A child that is not fit is ended, with all that it started.
+    """
+    log, stays = Log(child.output), False
+    try:
+        outcome = _watch(job, draft, inbox, child, log)
+        stays = outcome is None and child.is_fit and job.settings.isolation == "shared"
+    finally:
+        if not stays:
             processes.end_all_below()
-            log.drain()
-            child.end()
-        if outcome is not None:
-            for half in draft.iterdir():
-                half.unlink()
-            outcome = evolve(outcome, threads=job.threads, alone=job.alone)
-            write_cell(draft, job.cell, outcome)
-        (draft / "log.txt").write_bytes(log.whole())
-    return child if stays else None
+        log.drain()
+        if not stays:
+            child.close()
+    if outcome is not None:
+        _empty(draft)
+        write_cell(draft, job.cell, evolve(outcome, threads=job.threads, alone=job.alone))
+    (draft / "log.txt").write_bytes(log.whole())
+    return None if outcome is not None and outcome.status == "timeout" else stays
+
+
+def _empty(draft: Path) -> None:
+    for half in draft.iterdir():
+        if half.is_dir():
+            shutil.rmtree(half)
+        else:
+            half.unlink()
 
 
 def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> Outcome | None:
@@ -185,12 +199,12 @@ def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> 
             sources.remove(child.output)
         if child.line in ready:
             try:
-                reply = child.line.recv()
+                said, child.is_fit = child.line.recv()
             except (EOFError, OSError):
                 sources.remove(child.line)
             else:
-                if reply:
-                    raise OSError(reply)
+                if said:
+                    raise OSError(said)
                 return None
         if child.pid in (ended := processes.reap()):
             log.drain()

@@ -2,7 +2,6 @@
 
 import os
 import re
-from collections.abc import Callable
 from contextlib import suppress
 from math import isfinite
 
@@ -50,31 +49,46 @@ def mebibytes(value: object) -> int | None:
     return amount
 
 
-def counted(name: str) -> Callable[[object], int]:
-    """Reads a number of cells or threads.
+def jobs(value: object) -> int:
+    """A number of cells at once.
 
-    The reader raises a `UserError` for anything but a whole number from 1 to 256.
+    Raises
+    ------
+    UserError
+        If it is no whole number from 1 to 256.
     """
-
-    def read(value: object) -> int:
-        text = str(value)
-        number = int(text) if re.fullmatch(r"[0-9]{1,9}", text) else 0
-        if not 1 <= number <= _MOST:
-            raise UserError(f"{name} {value!r} is not a whole number from 1 to {_MOST}")
-        return number
-
-    return read
+    return _counted("jobs", value)
 
 
-def one_of(name: str, *possible: str) -> Callable[[str], str]:
-    """Reads one of a few words; the reader raises a `UserError` for any other."""
+def threads(value: object) -> int | None:
+    """A number of threads; None for a share of the cores.
 
-    def read(value: str) -> str:
-        if value not in possible:
-            raise UserError(f"{name} {value!r} is not {' or '.join(possible)}")
-        return value
+    Raises
+    ------
+    UserError
+        If it is no whole number from 1 to 256.
+    """
+    return None if value is None else _counted("threads", value)
 
-    return read
+
+def _counted(name: str, value: object) -> int:
+    number = int(str(value)) if re.fullmatch(r"[0-9]{1,9}", str(value)) else 0
+    if not 1 <= number <= _MOST:
+        raise UserError(f"{name} {value!r} is not a whole number from 1 to {_MOST}")
+    return number
+
+
+def isolation(value: object) -> str:
+    """How processes are shared out to cells.
+
+    Raises
+    ------
+    UserError
+        If it is neither of the two words.
+    """
+    if value not in ("process", "shared"):
+        raise UserError(f"isolation {value!r} is not process or shared")
+    return str(value)
 
 
 def cores() -> int:
@@ -82,8 +96,8 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def crowded(jobs: int, threads: int) -> str:
+def crowded(at_once: int, threads_each: int) -> str:
     """What is to be said where cells at once have more threads than there are cores; else nothing."""
-    if jobs * threads <= cores():
+    if at_once * threads_each <= cores():
         return ""
-    return f"{jobs} cells at once with {threads} threads each share {cores()} cores: they slow one another down"
+    return f"{at_once} cells at once with {threads_each} threads each share {cores()} cores: they slow one another down"

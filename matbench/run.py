@@ -5,9 +5,9 @@ import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from types import ModuleType
-from typing import Literal
+from typing import Any, Literal
 
 from matbench import plugins
 from matbench.keeper import Keeper, dismiss
@@ -112,7 +112,7 @@ def _here(
     ]
     waiting = deque(jobs)
     free: list[Keeper] = []
-    busy: dict[Connection, tuple[Keeper, Job]] = {}
+    busy: dict[Any, tuple[Keeper, Job]] = {}
     try:
         free += [Keeper(preload) for _ in range(min(settings.jobs, len(jobs)))]
         while waiting or busy:

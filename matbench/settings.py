@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from attrs import field, frozen
-from attrs.converters import optional
 
 from matbench import limits
 
@@ -50,9 +49,9 @@ class Settings:
     volumes: bool = False
     timeout: float | None = field(default=limits.HOUR, converter=limits.seconds)
     memory: int | None = field(default=None, converter=limits.mebibytes)
-    jobs: int = field(default=1, converter=limits.counted("jobs"))
-    threads: int | None = field(default=None, converter=optional(limits.counted("threads")))
-    isolation: str = field(default="process", converter=limits.one_of("isolation", "process", "shared"))
+    jobs: int = field(default=1, converter=limits.jobs)
+    threads: int | None = field(default=None, converter=limits.threads)
+    isolation: str = field(default="process", converter=limits.isolation)
     dask: str | None = None
 
     def threads_each(self) -> int:

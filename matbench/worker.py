@@ -26,7 +26,7 @@ from matbench.scene import Scene
 from matbench.scenes import load_scene
 from matbench.settings import Settings
 from matbench.spec import first_line
-from matbench.store import Outcome, Status, write_cell
+from matbench.store import FINAL, Outcome, Status, write_cell
 from matbench.volumes import StoredVolume
 
 _TINY = 16, 64  # rows and columns of the scene that methods are compiled on
@@ -148,9 +148,7 @@ def _solve(
     work = {name: int(count) for name, count in estimate.work.items()}
     volume = _volume(estimate, scene) if job.settings.volumes else None
     has_volume = volume is not None if job.settings.volumes else getattr(warm, "volume", None) is not None
-    outcome = Outcome(
-        "ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history, alone=job.alone
-    )
+    outcome = Outcome("ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history, alone=job.alone)
     return outcome, maps, volume
 
 
@@ -172,7 +170,7 @@ def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcom
     return evolve(outcome, row=row)
 
 
-def run_cell(job: Job, draft: Path) -> None:
+def run_cell(job: Job, draft: Path) -> Outcome:
     """Solve a cell and fill its folder, whatever the method raises."""
     cell, process, place = job.cell, os.getpid(), Path.cwd()
     maps = volume = None
@@ -196,21 +194,29 @@ def run_cell(job: Job, draft: Path) -> None:
         if os.getpid() != process:
             os._exit(1)
         traceback.print_exc()
-        said = str(error).lower()
-        is_memory = isinstance(error, MemoryError) or "insufficient memory" in said or "cannot allocate memory" in said
-        status: Status = (
-            "interrupted" if isinstance(error, KeyboardInterrupt) else "out-of-memory" if is_memory else "failed"
-        )
-        reason = f"{type(error).__name__}: {first_line(error)}"
+        status, reason = _what_failed(error)
         outcome = Outcome(status, threads=job.threads, reason=reason, alone=job.alone)
         maps = volume = None
     finally:
         os.chdir(place)
     write_cell(draft, cell, outcome, maps, volume)
+    return outcome
+
+
+def _what_failed(error: BaseException) -> tuple[Status, str]:
+    if isinstance(error, MemoryError):
+        return "out-of-memory", f"MemoryError: {error}"
+    reason = f"{type(error).__name__}: {first_line(error)}"
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", reason
+    is_memory = any(words in str(error).lower() for words in ("insufficient memory", "cannot allocate memory"))
+    return "out-of-memory" if is_memory else "failed", reason
 
 
 def serve(line: Connection, printed: int, job: Job) -> None:
-    """Solve the cells that come in, one by one; answer "" after each, or why it could not be written. Never returns.
+    """Solve the cells that come in, one by one. Never returns.
+
+    The answer to each is "", or why it could not be written, and whether this process is fit for another one.
 
     Parameters
     ----------
@@ -224,22 +230,24 @@ def serve(line: Connection, printed: int, job: Job) -> None:
     os.dup2(printed, 2)
     os.close(printed)
     sys.stdout, sys.stderr = (
-        open(number, "w", encoding="utf-8", errors="replace", buffering=1, closefd=False)  # noqa: SIM115, PTH123
+        open(number, "w", encoding="utf-8", errors="replace", buffering=1, closefd=False)  # noqa: SIM115
         for number in (1, 2)
     )
     faulthandler.enable(file=2)
     processes.confine(job.settings.memory_each())
     processes.use_threads(job.threads)
+    environment = dict(os.environ)
     with suppress(EOFError, OSError):
         while True:
             job, draft = line.recv()
             try:
-                run_cell(job, draft)
-                said = ""
+                said, is_fit = "", run_cell(job, draft).status in FINAL
             except OSError as error:
-                said = f"{type(error).__name__}: {error}"
+                said, is_fit = f"{type(error).__name__}: {error}", False
             _flush()
-            line.send(said)
+            line.send((said, is_fit))
+            os.environ.clear()
+            os.environ.update(environment)
     os._exit(0)
 
 
