@@ -169,14 +169,15 @@ def _client(settings: Settings) -> Iterator[Any]:
         raise UserError(
             f"Dask scheduler {settings.dask!r} cannot be reached: write tcp://HOST:PORT of one that runs, or local"
         ) from error
+    patience = 2  # who interrupts will not wait for long
     try:
         yield client
+        patience = 10
     finally:
-        with suppress(Exception):
-            client.close(timeout=2)
-        if cluster is not None:
-            with suppress(Exception):
-                cluster.close(timeout=2)
+        for one in (client, cluster):
+            if one is not None:
+                with suppress(Exception):
+                    one.close(timeout=patience)
 
 
 # on the workers
@@ -248,7 +249,7 @@ class Keepers:
             before = config.get("daemon")
             config["daemon"] = False
             try:
-                return Keeper([p.entry.module for p in plugins.installed("algorithms").values()])  # type: ignore[union-attr]
+                return Keeper(_built_in())
             finally:
                 config["daemon"] = before
 
@@ -256,6 +257,12 @@ class Keepers:
         with suppress(Empty):
             while True:
                 self.free.get_nowait().dismiss()
+
+
+def _built_in() -> list[str]:
+    every = [*plugins.installed("algorithms").values(), *plugins.installed("datasets").values()]
+    entries = [plugin.entry for plugin in every if plugin.source == "matbench-stereo"]
+    return [entry.module for entry in entries if not isinstance(entry, type)]
 
 
 _keepers = Keepers(SimpleQueue(), Lock())

@@ -249,7 +249,7 @@ class Keeper:
 
     def __init__(self, preload: Iterable[str] = ()) -> None:
         context = get_context("forkserver")
-        context.set_forkserver_preload(["matbench.keeper", *preload])
+        context.set_forkserver_preload(["matbench.keeper", "cv2", "threadpoolctl", *preload])
         self.line, theirs = Pipe()
         self._process: ForkServerProcess = context.Process(target=keep, args=(theirs,))
         self._process.start()

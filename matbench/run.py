@@ -102,6 +102,14 @@ def run(
             cluster.work(plan, store, settings, todo, tell)
 
 
+def _datasets(cells: Iterable[Cell]) -> list[str]:
+    """The modules that load the cells' scenes."""
+    known = plugins.installed("datasets")
+    prefixes = dict.fromkeys(cell.scene.partition("/")[0] for cell in cells)
+    entries = [known[prefix].entry for prefix in prefixes if prefix in known]
+    return [entry.module for entry in entries if not isinstance(entry, type)]
+
+
 def _here(
     plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Iterable[Cell], tell: Listener
 ) -> None:
@@ -111,6 +119,7 @@ def _here(
         for cell in todo
     ]
     waiting = deque(jobs)
+    preload = [*preload, *_datasets(job.cell for job in jobs)]
     free: list[Keeper] = []
     busy: dict[Any, tuple[Keeper, Job]] = {}
     try:

@@ -120,7 +120,6 @@ def test_a_worker_that_dies_and_one_that_comes_late(
     addresses = machines.pids()
     told: list[tuple[str, str]] = []
     first_is_done = threading.Event()
-    print(time.time(), "begin")
     ended: list[psutil.Process] = []
 
     def listen(event: run.Event, cell: run.Cell, outcome: run.Outcome | None) -> None:
@@ -205,7 +204,7 @@ def test_a_cluster_of_this_machine(tmp_path: Path) -> None:
     assert done.returncode == 1, done.stderr
     assert "crashed  exits on" in done.stdout
     assert "ok  flat on" in done.stdout
-    assert not done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_a_cluster_that_cannot_be_had(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
