@@ -85,6 +85,8 @@ def work(
     UserError
         If the cluster cannot be had.
     """
+    if settings.dask == "local":
+        settings = evolve(settings, threads=settings.threads_each(), memory=settings.memory_each())
     files = tuple((Path(file).name, Path(file).read_bytes()) for file in plan.plugin_files)
     with _client(settings) as client:
         from distributed import as_completed
@@ -95,9 +97,7 @@ def work(
         futures: dict[str, Any] = {}
 
         def submit(task: Task, before: list[Reply]) -> None:
-            tried = {reply.worker for reply in before}
-            others = [worker for worker in client.scheduler_info(n_workers=-1)["workers"] if worker not in tried]
-            chosen = {"workers": others, "allow_other_workers": True} if before else {}
+            chosen = {"workers": _others(client, before), "allow_other_workers": True} if before else {}
             future = client.submit(
                 solve, task, key=("matbench", this_run, task.cell.key, len(before)), pure=False, **chosen
             )
@@ -119,10 +119,12 @@ def work(
             client.cancel(list(futures.values()), force=True)
 
 
-def _others(client: Any, declined: Sequence[Reply]) -> bool:
-    """Is there a worker that has not declined?"""
+def _others(client: Any, declined: Sequence[Reply]) -> list[str]:
+    """The workers that have not declined; none once one of them has declined twice."""
     tried = [reply.worker for reply in declined]
-    return len(tried) == len(set(tried)) and bool(set(client.scheduler_info(n_workers=-1)["workers"]) - set(tried))
+    if len(set(tried)) < len(tried):
+        return []
+    return [worker for worker in client.scheduler_info(n_workers=-1)["workers"] if worker not in tried]
 
 
 def _arrived(store: Store, cell: Cell, future: Any, reply: Any, before: Sequence[Reply]) -> Outcome:

@@ -272,6 +272,7 @@ def compare(
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     row: int | None = None,
+    settings: Settings = Settings(),
 ) -> "pd.DataFrame":
     """Run methods on scenes and score them; the run folder stays for `matbench view` and the report.
 
@@ -298,6 +299,8 @@ def compare(
         Python files that hold further methods.
     row
         The image row whose epipolar slices recordings show; the middle one if not given.
+    settings
+        Limits, cells at once, a cluster: the fields of `Settings` that are no parameters here.
 
     Returns
     -------
@@ -312,7 +315,9 @@ def compare(
     comparison = prepare(
         algorithms,
         scenes,
-        settings=Settings(Path(data) if data is not None else None, record, row, volumes),
+        settings=evolve(
+            settings, data=Path(data) if data is not None else None, record=record, row=row, volumes=volumes
+        ),
         out=out,
         seed=seed,
         plugin=plugin,

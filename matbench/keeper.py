@@ -9,6 +9,7 @@ and ends all below it, as soon as nobody holds the other end of its line, so not
 import os
 import shutil
 import signal
+import sys
 import time
 from collections.abc import Iterable
 from contextlib import suppress
@@ -113,6 +114,7 @@ def keep(inbox: Connection) -> None:
     """Solve the cells of the jobs that come in, one by one; send "" after each, or why it could not be written."""
     os.setsid()  # Ctrl-C is for whoever holds the line
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
     processes.adopt_orphans()
     child: Child | None = None
     try:

@@ -226,6 +226,7 @@ def serve(line: Connection, printed: int, job: Job) -> None:
         The first of them, by whose settings the process is confined.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.dup2(printed, 1)
     os.dup2(printed, 2)
     os.close(printed)
