@@ -157,7 +157,8 @@ def _client(settings: Settings) -> Iterator[Any]:
     except ImportError as error:
         raise UserError("--dask needs Dask: pip install 'matbench-stereo[cluster]'") from error
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):  # what goes wrong is told in the cells
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     cluster: Any = None
     try:
         if settings.dask == "local":
