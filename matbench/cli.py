@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from cyclopts import App, CycloptsError, Parameter
 from rich import console as rich_console
 
+from matbench import limits
 from matbench._version import __version__
 from matbench.errors import UserError
 from matbench.settings import Settings
@@ -91,6 +92,38 @@ class Options:
     ] = field(factory=lambda: ["0"])
     plugin: Plugins = field(factory=list)
     metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1"
+    timeout: Annotated[
+        str, Parameter(help="Seconds that each cell may take, reading, warm-up and recording included; or none.")
+    ] = f"{limits.HOUR:g}"
+    memory: Annotated[
+        str | None, Parameter(help="Memory that each cell may hold, such as 4G; default a share of the machine's.")
+    ] = None
+    jobs: Annotated[str, Parameter(help="Cells that run at once. Their seconds are then marked as not comparable.")] = (
+        "1"
+    )
+    threads: Annotated[
+        str | None, Parameter(help="Threads that each method is given; default the cores, shared out to the jobs.")
+    ] = None
+    isolation: Annotated[
+        str, Parameter(help="process: one for each cell; shared: one for many, for methods that you trust.")
+    ] = "process"
+    dask: Annotated[
+        str | None,
+        Parameter(help="Dask scheduler that hands out the cells, tcp://HOST:PORT; or local: JOBS workers here."),
+    ] = None
+
+    @property
+    def settings(self) -> Settings:
+        """How to run, but for what is kept."""
+        return Settings(
+            self.data,
+            timeout=self.timeout,
+            memory=self.memory,
+            jobs=self.jobs,
+            threads=self.threads,
+            isolation=self.isolation,
+            dask=self.dask,
+        )
 
     @property
     def seeds(self) -> list[int]:
@@ -143,6 +176,12 @@ def compare(
     `matbench compare -a materiality -s synthetic/box -m surface_f_1`
 
     `matbench compare -s 'synthetic/*[predict=right]' -m prediction_psnr`
+
+    Four cells at once, none of them longer than ten minutes or larger than 2 GiB; on a Dask cluster:
+
+    `matbench compare --jobs 4 --timeout 600 --memory 2G`
+
+    `matbench compare --dask tcp://head:8786`
     """
     from matbench import comparison
     from matbench.commands import running
@@ -155,8 +194,11 @@ def compare(
     ready = comparison.prepare(
         algorithm,
         scene,
-        settings=Settings(
-            options.data, record, None if row is None else _whole("row", row), volumes or _is_of_volumes(options.metric)
+        settings=evolve(
+            options.settings,
+            record=record,
+            row=None if row is None else _whole("row", row),
+            volumes=volumes or _is_of_volumes(options.metric),
         ),
         out=options.out,
         seed=options.seeds,
@@ -207,7 +249,7 @@ def ablate(
     ready = comparison.prepare(
         algorithms,
         scene,
-        settings=Settings(options.data, volumes=_is_of_volumes(options.metric)),
+        settings=evolve(options.settings, volumes=_is_of_volumes(options.metric)),
         out=options.out,
         seed=options.seeds,
         plugin=options.plugin,

@@ -14,7 +14,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from matbench import plugins, run, scoring, spec
+from matbench import limits, plugins, run, scoring, spec
 from matbench._version import __version__
 from matbench.dataset import Listing
 from matbench.errors import UserError, unknown
@@ -144,7 +144,7 @@ def machine() -> dict[str, str]:
         **{name: version(name) for name in libraries},
         "system": f"{platform.system()} {platform.machine()}",
         "processor": _processor(),
-        "threads": str(run.threads()),
+        "threads": str(limits.cores()),
     }
 
 
@@ -272,6 +272,7 @@ def compare(
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     row: int | None = None,
+    settings: Settings = Settings(),
 ) -> "pd.DataFrame":
     """Run methods on scenes and score them; the run folder stays for `matbench view` and the report.
 
@@ -298,6 +299,8 @@ def compare(
         Python files that hold further methods.
     row
         The image row whose epipolar slices recordings show; the middle one if not given.
+    settings
+        Limits, cells at once, a cluster: the fields of `Settings` that are no parameters here.
 
     Returns
     -------
@@ -312,7 +315,9 @@ def compare(
     comparison = prepare(
         algorithms,
         scenes,
-        settings=Settings(Path(data) if data is not None else None, record, row, volumes),
+        settings=evolve(
+            settings, data=Path(data) if data is not None else None, record=record, row=row, volumes=volumes
+        ),
         out=out,
         seed=seed,
         plugin=plugin,

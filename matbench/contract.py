@@ -20,7 +20,7 @@ from pebble import ProcessExpired, ProcessPool
 from matbench import plugins, spec
 from matbench.algorithm import Context
 from matbench.plan import Method
-from matbench.run import _kernels_kept, _without_main
+from matbench.run import kernels_kept, without_main
 from matbench.scene import Range, Scene
 from matbench.scenes import load_scene
 from matbench.spec import first_line
@@ -216,7 +216,7 @@ def _where(error: BaseException) -> str:
 def _processes(module: str | None) -> Iterator[ProcessPool]:
     context = get_context("forkserver")
     context.set_forkserver_preload(["matbench.contract", *([module] if module else [])])
-    with _without_main(), _kernels_kept(), ProcessPool(max_workers=1, max_tasks=1, context=context) as pool:
+    with without_main(), kernels_kept(), ProcessPool(max_workers=1, max_tasks=1, context=context) as pool:
         try:
             yield pool
         except BaseException:

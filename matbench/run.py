@@ -2,28 +2,22 @@
 
 import os
 import sys
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import TimeoutError as FutureTimeout
 from contextlib import contextmanager, suppress
-from multiprocessing import get_context
+from multiprocessing.connection import wait
 from types import ModuleType
-from typing import Literal
-
-from pebble import ProcessExpired, ProcessPool
+from typing import Any, Literal
 
 from matbench import plugins
+from matbench.keeper import Keeper, dismiss
 from matbench.plan import Cell, Plan
 from matbench.settings import Settings
-from matbench.store import FINAL, Outcome, Store, write_cell
-from matbench.worker import Job, run_cell
+from matbench.store import FINAL, Outcome, Store
+from matbench.worker import Job
 
 Event = Literal["start", "done"]
 Listener = Callable[[Event, Cell, Outcome | None], None]
-
-
-def threads() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
@@ -46,7 +40,7 @@ def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
 
 
 @contextmanager
-def _without_main() -> Iterator[None]:
+def without_main() -> Iterator[None]:
     """Keep child processes from running the user's script again: nothing that they do lies in it."""
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -57,7 +51,7 @@ def _without_main() -> Iterator[None]:
 
 
 @contextmanager
-def _kernels_kept() -> Iterator[None]:
+def kernels_kept() -> Iterator[None]:
     """Let the processes started meanwhile keep compiled kernels where no other code's are."""
     before = os.environ.get("NUMBA_CACHE_DIR")
     with suppress(OSError):  # without a folder to keep them in, kernels are compiled anew
@@ -82,15 +76,15 @@ def run(
 ) -> None:
     """Compute every cell of a plan that is not done.
 
-    One cell at a time, so that seconds are comparable. Each is solved in a fresh process forked
-    from a small server that has imported the libraries once; whatever a method does to its
-    process costs that cell alone. `KeyboardInterrupt` ends the cell under way and is passed on;
-    what is finished stays.
+    One cell at a time unless the settings say otherwise, so that seconds are comparable. Each is
+    solved in a process that a keeper watches (`matbench.keeper`), or on a cluster
+    (`matbench.cluster`); whatever a method does costs that cell alone. `KeyboardInterrupt` ends
+    the cells under way and is passed on; what is finished stays.
 
     Parameters
     ----------
     preload
-        Modules that the server imports besides the harness, such as those of the methods.
+        Modules that are imported once for all cells, besides the harness, such as those of the methods.
     listen
         Told as each cell starts and ends.
     """
@@ -99,38 +93,50 @@ def run(
     if not todo:
         return
     store.sweep()
-    context = get_context("forkserver")
-    context.set_forkserver_preload(["matbench.worker", *preload])
-    with _without_main(), _kernels_kept(), ProcessPool(max_workers=1, max_tasks=1, context=context) as pool:
-        try:
-            for cell in todo:
-                tell("start", cell, None)
-                job = Job(store.folder, cell, plan.plugin_files, threads(), settings)
-                outcome = _finish(pool, job, store)
-                tell("done", cell, outcome)
-        except BaseException:
-            pool.stop()
-            pool.join()
-            store.sweep()
-            raise
+    with without_main(), kernels_kept():
+        if settings.dask is None:
+            _here(plan, store, settings, preload, todo, tell)
+        else:
+            from matbench import cluster
+
+            cluster.work(plan, store, settings, todo, tell)
 
 
-def _finish(pool: ProcessPool, job: Job, store: Store) -> Outcome:
-    future = pool.schedule(run_cell, args=[job])
+def _datasets(cells: Iterable[Cell]) -> list[str]:
+    """The modules that load the cells' scenes."""
+    known = plugins.installed("datasets")
+    prefixes = dict.fromkeys(cell.scene.partition("/")[0] for cell in cells)
+    entries = [known[prefix].entry for prefix in prefixes if prefix in known]
+    return [entry.module for entry in entries if not isinstance(entry, type)]
+
+
+def _here(
+    plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Iterable[Cell], tell: Listener
+) -> None:
+    """Share out cells to keepers on this machine."""
+    jobs = [
+        Job(store.folder.resolve(), cell, plan.plugin_files, settings.threads_each(), settings, settings.jobs == 1)
+        for cell in todo
+    ]
+    waiting = deque(jobs)
+    preload = [*preload, *_datasets(job.cell for job in jobs)]
+    free: list[Keeper] = []
+    busy: dict[Any, tuple[Keeper, Job]] = {}
     try:
-        while True:
-            try:
-                future.result(timeout=1)  # in slices: a signal is answered within a second
-                break
-            except FutureTimeout:
-                if future.done():
-                    raise
-    except ProcessExpired as error:
-        code = f"exit status {error.exitcode}" if error.exitcode is not None else "no exit status"
-        crashed = Outcome("crashed", reason=f"the method ended its process ({code})")
-        with store.building(job.cell) as draft:
-            write_cell(draft, job.cell, crashed)
-        return crashed
-    except Exception as error:  # the disk is full, say: a method's own failure is told in its cell
-        return Outcome("failed", reason=f"its cell could not be written: {type(error).__name__}: {error}")
-    return store.outcome(job.cell) or Outcome("failed", reason="the cell's process left no result")
+        free += [Keeper(preload) for _ in range(min(settings.jobs, len(jobs)))]
+        while waiting or busy:
+            while waiting and free:
+                keeper, job = free.pop(), waiting.popleft()
+                busy[keeper.line] = keeper, job
+                keeper.take(job)
+                tell("start", job.cell, None)
+            for line in wait(list(busy)):
+                keeper, job = busy[line]
+                outcome, lives = keeper.done(job)
+                if not lives:
+                    dismiss([keeper])
+                del busy[line]
+                free.append(keeper if lives else Keeper(preload))
+                tell("done", job.cell, outcome)
+    finally:
+        dismiss([*free, *(keeper for keeper, _ in busy.values())])

@@ -30,6 +30,7 @@ CELL_COLUMNS = (
     "warmup_seconds",
     "peak_mb",
     "threads",
+    "alone",
     "work",
     "reason",
     "cell",
@@ -147,9 +148,9 @@ def cells(plan: Plan, store: Store) -> pd.DataFrame:
         outcome = store.outcome(cell)
         head = (cell.method.algorithm, cell.method.changed, cell.scene, cell.seed)
         if outcome is None:
-            rows.append((*head, "interrupted", None, None, None, None, "", "not computed yet", cell.key))
+            rows.append((*head, "interrupted", None, None, None, None, None, "", "not computed yet", cell.key))
             continue
-        cost = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb, outcome.threads)
+        cost = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb, outcome.threads, outcome.alone)
         work = " ".join(f"{name}={count}" for name, count in outcome.work.items())
         rows.append((*head, outcome.status, *cost, work, outcome.reason, cell.key))
     return pd.DataFrame(rows, columns=list(CELL_COLUMNS))

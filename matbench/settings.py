@@ -1,8 +1,10 @@
-"""How a plan is worked through: where scenes lie, and what is kept of each cell besides its maps."""
+"""How a plan is worked through: where scenes lie, what is kept of each cell besides its maps, and what it may take."""
 
 from pathlib import Path
 
-from attrs import frozen
+from attrs import field, frozen
+
+from matbench import limits
 
 
 @frozen
@@ -19,9 +21,45 @@ class Settings:
         The image row that recordings show; the middle one of each scene if None.
     volumes
         Keep the volumes of the methods that have one.
+    timeout
+        Seconds that a cell may take, all told: reading the scene, warm-up, solve, recording. None for no limit.
+    memory
+        MiB that a cell's processes may hold together, or a text such as ``"4G"``. None for an
+        equal share of nine tenths of the machine's.
+    jobs
+        How many cells run at once.
+    threads
+        How many threads each method is given; the cores, shared out to `jobs`, if None.
+    isolation
+        ``"process"``: each cell has a process of its own. ``"shared"``: a process solves one cell
+        after the other, until one goes wrong; for trusted methods.
+    dask
+        The address of the Dask scheduler that hands out the cells; ``"local"`` for a cluster of `jobs`
+        workers on this machine; None for no cluster.
+
+    Raises
+    ------
+    UserError
+        For a limit or a count that makes no sense.
     """
 
     data: Path | None = None
     record: bool = False
     row: int | None = None
     volumes: bool = False
+    timeout: float | None = field(default=limits.HOUR, converter=limits.seconds)
+    memory: int | None = field(default=None, converter=limits.mebibytes)
+    jobs: int = field(default=1, converter=limits.jobs)
+    threads: int | None = field(default=None, converter=limits.threads)
+    isolation: str = field(default="process", converter=limits.isolation)
+    dask: str | None = None
+
+    def threads_each(self) -> int:
+        """How many threads each method is given on this machine."""
+        return self.threads or max(1, limits.cores() // self.jobs)
+
+    def memory_each(self) -> int:
+        """How many MiB each cell may hold on this machine."""
+        from matbench.processes import room
+
+        return self.memory or max(1, room() // self.jobs)

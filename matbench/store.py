@@ -18,7 +18,7 @@ from matbench.errors import UserError
 from matbench.plan import Cell, Plan
 from matbench.volumes import StoredVolume
 
-Status = Literal["ok", "skipped", "failed", "crashed", "interrupted"]
+Status = Literal["ok", "skipped", "failed", "timeout", "out-of-memory", "crashed", "interrupted"]
 FINAL: frozenset[Status] = frozenset({"ok", "skipped"})
 
 _json = make_converter()
@@ -44,6 +44,8 @@ class Outcome:
         As the estimate gave them; None for a number that is not finite.
     row
         The image row that its recording shows, if it has one.
+    alone
+        Did no other cell of the run run meanwhile? Otherwise `seconds` is not comparable.
     """
 
     status: Status
@@ -56,6 +58,7 @@ class Outcome:
     work: Mapping[str, int] = {}
     history: Mapping[str, list[float | None]] = {}
     row: int | None = None
+    alone: bool = True
 
 
 def write_text(path: Path, text: str) -> None:

@@ -1,12 +1,16 @@
-"""Solving one cell, in a process of its own."""
+"""Solving cells, in a process that a keeper watches."""
 
+import ctypes
+import faulthandler
 import os
 import resource
+import signal
+import sys
 import time
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from contextlib import suppress
 from math import isfinite
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +18,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from matbench import plugins, spec
+from matbench import plugins, processes, spec
 from matbench.algorithm import Algorithm, Context, Estimate
 from matbench.errors import UserError
 from matbench.plan import Cell
@@ -22,7 +26,7 @@ from matbench.scene import Scene
 from matbench.scenes import load_scene
 from matbench.settings import Settings
 from matbench.spec import first_line
-from matbench.store import Outcome, Store, write_cell
+from matbench.store import FINAL, Outcome, Status, write_cell
 from matbench.volumes import StoredVolume
 
 _TINY = 16, 64  # rows and columns of the scene that methods are compiled on
@@ -36,6 +40,10 @@ class Job:
     ----------
     run
         The run folder.
+    threads
+        How many the method is given.
+    alone
+        Does no other cell of the run run meanwhile?
     """
 
     run: Path
@@ -43,6 +51,7 @@ class Job:
     plugin_files: tuple[str, ...]
     threads: int
     settings: Settings
+    alone: bool = True
 
 
 def tiny(scene: Scene) -> Scene:
@@ -101,22 +110,6 @@ def _peak_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-@contextmanager
-def _output_to(path: Path) -> Iterator[None]:
-    """Send all that this process prints, from Python or from C, to a file."""
-    with path.open("w", encoding="utf-8", errors="replace", buffering=1) as log:
-        kept = os.dup(1), os.dup(2)
-        os.dup2(log.fileno(), 1)
-        os.dup2(log.fileno(), 2)
-        try:
-            with redirect_stdout(log), redirect_stderr(log):
-                yield
-        finally:
-            for saved, number in zip(kept, (1, 2), strict=True):
-                os.dup2(saved, number)
-                os.close(saved)
-
-
 def _volume(estimate: Estimate, scene: Scene) -> StoredVolume | None:
     """The estimate's volume as it is kept; None where it has none of that kind, which is said in the log."""
     if estimate.volume is None:
@@ -155,7 +148,8 @@ def _solve(
     work = {name: int(count) for name, count in estimate.work.items()}
     volume = _volume(estimate, scene) if job.settings.volumes else None
     has_volume = volume is not None if job.settings.volumes else getattr(warm, "volume", None) is not None
-    return Outcome("ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history), maps, volume
+    outcome = Outcome("ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history, alone=job.alone)
+    return outcome, maps, volume
 
 
 def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcome:
@@ -176,25 +170,91 @@ def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcom
     return evolve(outcome, row=row)
 
 
-def run_cell(job: Job) -> None:
-    """Solve a cell and move its folder into the run, whatever becomes of the method.
-
-    A method that raises is a failed cell with its traceback in ``log.txt``; one that ends the
-    process is noticed by whoever started it.
-    """
-    store, cell = Store(job.run), job.cell
-    with store.building(cell) as draft, _output_to(draft / "log.txt"):
+def run_cell(job: Job, draft: Path) -> Outcome:
+    """Solve a cell and fill its folder, whatever the method raises."""
+    cell, process, place = job.cell, os.getpid(), Path.cwd()
+    maps = volume = None
+    try:
+        plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
+        if plugins.code_digest(plugin) != cell.method.code:
+            raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
+        method = spec.build(plugin.name, plugin.load(), cell.method.params)
+        scene = hide_truth(load_scene(cell.scene, job.settings.data))
+        if scene.digest != cell.scene_digest:
+            raise UserError(f"{cell.scene} is not what it was when the run was planned")
+        outcome, maps, volume = _solve(method, scene, job)
+        if os.getpid() != process:  # a copy that the method made of its process
+            os._exit(1)
+        if evolve(scene).digest != cell.scene_digest:
+            raise ValueError("the method wrote into its input")
+        os.chdir(place)
+        if job.settings.record and outcome.status == "ok":
+            outcome = _record(method, job, draft / "recording.rrd", outcome)
+    except BaseException as error:  # SystemExit and KeyboardInterrupt, too: no signal comes here
+        if os.getpid() != process:
+            os._exit(1)
+        traceback.print_exc()
+        status, reason = _what_failed(error)
+        outcome = Outcome(status, threads=job.threads, reason=reason, alone=job.alone)
         maps = volume = None
-        try:
-            plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
-            method = spec.build(plugin.name, plugin.load(), cell.method.params)
-            scene = hide_truth(load_scene(cell.scene, job.settings.data))
-            if scene.digest != cell.scene_digest:
-                raise UserError(f"{cell.scene} is not what it was when the run was planned")
-            outcome, maps, volume = _solve(method, scene, job)
-            if job.settings.record and outcome.status == "ok":
-                outcome = _record(method, job, draft / "recording.rrd", outcome)
-        except (Exception, SystemExit, KeyboardInterrupt) as error:  # Ctrl-C never comes to this process
-            traceback.print_exc()
-            outcome, maps = Outcome("failed", reason=f"{type(error).__name__}: {first_line(error)}"), None
-        write_cell(draft, cell, outcome, maps, volume if maps is not None else None)
+    finally:
+        os.chdir(place)
+    write_cell(draft, cell, outcome, maps, volume)
+    return outcome
+
+
+def _what_failed(error: BaseException) -> tuple[Status, str]:
+    if isinstance(error, MemoryError):
+        return "out-of-memory", f"MemoryError: {error}"
+    reason = f"{type(error).__name__}: {first_line(error)}"
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", reason
+    is_memory = any(words in str(error).lower() for words in ("insufficient memory", "cannot allocate memory"))
+    return "out-of-memory" if is_memory else "failed", reason
+
+
+def serve(line: Connection, printed: int, job: Job) -> None:
+    """Solve the cells that come in, one by one. Never returns.
+
+    The answer to each is "", or why it could not be written, and whether this process is fit for another one.
+
+    Parameters
+    ----------
+    printed
+        The file descriptor for all that this process prints, from Python or from C.
+    job
+        The first of them, by whose settings the process is confined.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.dup2(printed, 1)
+    os.dup2(printed, 2)
+    os.close(printed)
+    sys.stdout, sys.stderr = (
+        open(number, "w", encoding="utf-8", errors="replace", buffering=1, closefd=False)  # noqa: SIM115
+        for number in (1, 2)
+    )
+    faulthandler.enable(file=2)
+    processes.confine(job.settings.memory_each())
+    processes.use_threads(job.threads)
+    environment = dict(os.environ)
+    with suppress(EOFError, OSError):
+        while True:
+            job, draft = line.recv()
+            try:
+                said, is_fit = "", run_cell(job, draft).status in FINAL
+            except OSError as error:
+                said, is_fit = f"{type(error).__name__}: {error}", False
+            _flush()
+            line.send((said, is_fit))
+            os.environ.clear()
+            os.environ.update(environment)
+    os._exit(0)
+
+
+def _flush() -> None:
+    """Send on what was printed, from C too."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(Exception):  # the method may have closed or replaced it
+            stream.flush()
+    ctypes.CDLL(None).fflush(None)

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from matbench import scoring
 from matbench.cli import DONE, FAILED, INTERRUPTED, Console
 from matbench.comparison import Comparison
+from matbench.limits import crowded
 from matbench.reports import curves, tables
 from matbench.reports import switches as effects
 from matbench.run import pending
@@ -23,6 +24,8 @@ def work(ready: Comparison, metric: str, is_ablation: bool = False) -> int:
     console = Console()
     for reason, scenes in ready.left_out.items():
         console.say(f"without {', '.join(scenes)}: {reason}")
+    if ready.settings.dask is None and (crowd := crowded(ready.settings.jobs, ready.settings.threads_each())):
+        console.say(crowd)
     stopped = _run(ready, console)
     results, cells = ready.tables()
     sweeps = ready.sweeps(results)
