@@ -1,8 +1,12 @@
 """How a plan is worked through: where scenes lie, and what is kept of each cell besides its maps."""
 
 from pathlib import Path
+from typing import Literal
 
-from attrs import frozen
+from attrs import field, frozen
+from attrs.validators import in_
+
+Only = Literal["missing", "failed", "all"]
 
 
 @frozen
@@ -19,9 +23,13 @@ class Settings:
         The image row that recordings show; the middle one of each scene if None.
     volumes
         Keep the volumes of the methods that have one.
+    only
+        Which cells: ``missing`` were never computed, ``failed`` did not end well, ``all`` again; if
+        None, whatever is not done.
     """
 
     data: Path | None = None
     record: bool = False
     row: int | None = None
     volumes: bool = False
+    only: Only | None = field(default=None, validator=in_((None, "missing", "failed", "all")))

@@ -1,7 +1,10 @@
 """Solving one cell, in a process of its own."""
 
+import ctypes
 import os
 import resource
+import signal
+import sys
 import time
 import traceback
 from collections.abc import Iterator
@@ -176,23 +179,33 @@ def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcom
     return evolve(outcome, row=row)
 
 
+def _die_with_parent() -> None:
+    """Have the system end this process when the one that started it ends: no orphan goes on (Linux)."""
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
+
 def run_cell(job: Job) -> None:
     """Solve a cell and move its folder into the run, whatever becomes of the method.
 
     A method that raises is a failed cell with its traceback in ``log.txt``; one that ends the
     process is noticed by whoever started it.
     """
+    _die_with_parent()
     store, cell = Store(job.run), job.cell
     with store.building(cell) as draft, _output_to(draft / "log.txt"):
         maps = volume = None
         try:
             plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
+            if plugins.code_digest(plugin) != cell.method.code:
+                raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
             method = spec.build(plugin.name, plugin.load(), cell.method.params)
             scene = hide_truth(load_scene(cell.scene, job.settings.data))
             if scene.digest != cell.scene_digest:
                 raise UserError(f"{cell.scene} is not what it was when the run was planned")
             outcome, maps, volume = _solve(method, scene, job)
-            if job.settings.record and outcome.status == "ok":
+            if job.settings.record and not cell.repeat and outcome.status == "ok":
                 outcome = _record(method, job, draft / "recording.rrd", outcome)
         except (Exception, SystemExit, KeyboardInterrupt) as error:  # Ctrl-C never comes to this process
             traceback.print_exc()

@@ -14,7 +14,7 @@ from matbench.cli import DONE, FAILED, INTERRUPTED, Console
 from matbench.comparison import Comparison
 from matbench.reports import curves, tables
 from matbench.reports import switches as effects
-from matbench.run import pending
+from matbench.todo import explained, pending
 from matbench.scenes import DATA_VARIABLE, data_root
 
 
