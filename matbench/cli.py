@@ -14,7 +14,7 @@ from rich import console as rich_console
 
 from matbench._version import __version__
 from matbench.errors import UserError
-from matbench.settings import Settings
+from matbench.settings import Only, Settings
 
 
 class Console(rich_console.Console):
@@ -47,6 +47,8 @@ app = App(
 `matbench ablate 'materiality[pairs=all,consecutive]' -s 'middlebury*/*' --data DATA`
 
 `matbench check mine.py`  does a method of your own keep to what is asked of it?
+
+`matbench status runs/1a2b3c4d`  where a run stands, also while it runs
 
 `matbench list`  methods with their parameters, scenes, metrics
 
@@ -91,6 +93,15 @@ class Options:
     ] = field(factory=lambda: ["0"])
     plugin: Plugins = field(factory=list)
     metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1"
+    only: Annotated[
+        Only | None,
+        Parameter(
+            help="`missing`: cells never computed, `failed`: those that did not end well, `all`: every cell again; "
+            "default what is not done."
+        ),
+    ] = None
+    repeats: Annotated[str, Parameter(help="Solve every cell so often: does a method repeat itself?")] = "1"
+    dry_run: Annotated[bool, Parameter(negative="", help="Only say what would run, and why.")] = False
 
     @property
     def seeds(self) -> list[int]:
@@ -147,7 +158,7 @@ def compare(
     from matbench import comparison
     from matbench.commands import running
 
-    _check_metric(options.metric)
+    check_metric(options.metric)
     if row is not None and not record:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
@@ -156,13 +167,19 @@ def compare(
         algorithm,
         scene,
         settings=Settings(
-            options.data, record, None if row is None else _whole("row", row), volumes or _is_of_volumes(options.metric)
+            options.data,
+            record,
+            None if row is None else _whole("row", row),
+            volumes or _is_of_volumes(options.metric),
+            only=options.only,
         ),
         out=options.out,
         seed=options.seeds,
         plugin=options.plugin,
+        repeats=_whole("repeats", options.repeats),
+        write=not options.dry_run,
     )
-    return running.work(ready, options.metric)
+    return running.show_plan(ready) if options.dry_run else running.work(ready, options.metric)
 
 
 @app.command(help_epilogue="")
@@ -197,7 +214,7 @@ def ablate(
     from matbench.commands import running
     from matbench.plan import methods
 
-    _check_metric(options.metric)
+    check_metric(options.metric)
     algorithms: list[str] = [selector]
     if selector.endswith(".toml"):
         algorithms, listed = comparison.read_request(Path(selector))
@@ -207,11 +224,15 @@ def ablate(
     ready = comparison.prepare(
         algorithms,
         scene,
-        settings=Settings(options.data, volumes=_is_of_volumes(options.metric)),
+        settings=Settings(options.data, volumes=_is_of_volumes(options.metric), only=options.only),
         out=options.out,
         seed=options.seeds,
         plugin=options.plugin,
+        repeats=_whole("repeats", options.repeats),
+        write=not options.dry_run,
     )
+    if options.dry_run:
+        return running.show_plan(ready)
     return running.work(ready, options.metric, is_ablation=any(ablation.factors(chosen).values()))
 
 
@@ -222,7 +243,7 @@ def _whole(name: str, text: str) -> int:
     return int(text)
 
 
-def _check_metric(metric: str) -> None:
+def check_metric(metric: str) -> None:
     from matbench import scoring
     from matbench.errors import unknown
 
@@ -294,6 +315,11 @@ def view(
 
 
 app.command("matbench.commands.check:app", name="check", help="Try methods: do they keep to what is asked of them?")
+app.command("matbench.commands.status:app", name="status", help="Show where a run stands, also while it runs.")
+app.command("matbench.commands.score:app", name="score", help="Score stored maps again: no method runs.")
+app.command(
+    "matbench.commands.export:app", name="export", help="Make one archive of a run: all that checks its tables."
+)
 app.command("matbench.commands.fetch:app", name="fetch", help="Download scenes, check them, and put them in place.")
 app.command("matbench.commands.scene:app", name="scene", help="Look at scenes, check them, and make your own.")
 

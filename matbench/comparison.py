@@ -150,7 +150,7 @@ class Comparison:
                 cells=cells,
                 maps=disparity,
                 scenes=self.scenes,
-                facts=self._facts(),
+                facts=self._facts(cells),
                 ablation=ablation,
                 sweeps=tuple(sweeps),
                 reliability=reliability,
@@ -159,14 +159,18 @@ class Comparison:
         )
         return path
 
-    def _facts(self) -> dict[str, str]:
+    def _facts(self, cells: "pd.DataFrame") -> dict[str, str]:
         """What the cells ran on, each on its own: a run may go on elsewhere."""
+        from matbench.reports import tables
+
         outcomes = [o for o in (self.store.outcome(cell, whole=False) for cell in self.plan.cells) if o is not None]
         threads = [{"threads": str(o.threads)} for o in outcomes if o.threads]
         seeds = {"seeds": ", ".join(str(seed) for seed in self.plan.request["seeds"]), "scorer": scorer.digest()}
         facts = {**provenance.combined([*(o.ran_on for o in outcomes), *threads]), **seeds}
         if differing := unsteady(self.plan, self.store):
             facts["not repeatable"] = "; ".join(differing)
+        if note := tables.timing_note(cells):
+            facts["times"] = note
         return facts
 
 

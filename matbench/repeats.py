@@ -49,7 +49,8 @@ def repeats(plan: Plan, store: Store) -> dict[str, Repeats]:
 def unsteady(plan: Plan, store: Store) -> list[str]:
     """The cells whose repeats differ, a line each."""
     return [
-        f"{found.cell}: {found.solved} solves gave {found.answers} answers, {100 * found.differ:.3g} % of the pixels differ"
+        f"{found.cell}: {found.solved} solves gave {found.answers} answers, "
+        f"which differ in {100 * found.differ:.3g} % of the pixels"
         for found in repeats(plan, store).values()
         if found.answers > 1
     ]

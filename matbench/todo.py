@@ -34,9 +34,9 @@ def _pending(plan: Plan, store: Store, settings: Settings) -> Iterator[tuple[Cel
     for cell in plan.cells:
         outcome = store.outcome(cell)
         is_failed = outcome is not None and outcome.status not in FINAL
-        if settings.only == "all" or (settings.only != "missing" and is_failed):
-            yield cell, outcome
-        elif settings.only != "failed" and not is_failed and _lacks(cell, outcome, store, settings):
+        is_missing = not is_failed and bool(_lacks(cell, outcome, store, settings))
+        due = {"all": True, "failed": is_failed, "missing": is_missing, None: is_failed or is_missing}
+        if due[settings.only]:
             yield cell, outcome
 
 
