@@ -97,7 +97,8 @@ def _run(ready: Comparison, console: Console) -> bool:
     todo = len(pending(ready.plan, ready.store, ready.settings))
     total = len(ready.plan.cells)
     if todo < total:
-        console.say(f"{total - todo} of {total} cells are done already in {ready.folder}")
+        what = "are done already" if ready.settings.only is None else "stay as they are"
+        console.say(f"{total - todo} of {total} cells {what} in {ready.folder}")
     columns = (BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("starting", total=total, completed=total - todo)
