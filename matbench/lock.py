@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import get_ident
 
 from attrs import define, field
 from filelock import FileLock, Timeout
@@ -66,12 +67,12 @@ class Work:
             return None
 
 
-_held: dict[Path, Work] = {}
+_held: dict[tuple[Path, int], Work] = {}  # folder and thread
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[Work]:
-    """Be the one process that works on a run folder; within itself it may be asked for again.
+    """Be the one that works on a run folder; a thread that is may ask again.
 
     The system gives the lock back when a process ends, however it ends.
 
@@ -81,8 +82,9 @@ def locked(folder: Path) -> Iterator[Work]:
         If another process has it, or the folder cannot be locked.
     """
     place = folder.resolve()
-    if place in _held:
-        yield _held[place]
+    key = place, get_ident()
+    if key in _held:
+        yield _held[key]
         return
     lock = FileLock(place / LOCK)
     try:
@@ -91,12 +93,12 @@ def locked(folder: Path) -> Iterator[Work]:
         raise UserError(f"run folder {str(folder)!r} is in use by {_holder(folder)}: wait for it, or end it") from error
     except (OSError, NotImplementedError) as error:
         raise UserError(f"run folder {str(folder)!r} cannot be locked: {error}") from error
-    work = _held[place] = Work(place)
+    work = _held[key] = Work(place)
     work.tell()
     try:
         yield work
     finally:
-        del _held[place]
+        del _held[key]
         with suppress(OSError):
             (place / WORK).unlink(missing_ok=True)
         with suppress(OSError):
@@ -105,7 +107,7 @@ def locked(folder: Path) -> Iterator[Work]:
 
 def is_locked(folder: Path) -> bool:
     """Does a process work on a run folder? One that may not be written to is said to be at rest."""
-    if folder.resolve() in _held:
+    if (folder.resolve(), get_ident()) in _held:
         return True
     if not (folder / LOCK).exists():
         return False

@@ -1,5 +1,6 @@
 """Runs that are killed, starved and crowded, and go on as if nothing had been."""
 
+import importlib
 import json
 import os
 import random
@@ -19,18 +20,19 @@ import psutil
 import pytest
 from attrs import evolve
 from launcher import METHODS, SCENE, SEEDS
+from scene_files import Layers, write_png
 
-import matbench
-from matbench import comparison
+from matbench import comparison, plugins, scorer, scoring
 from matbench.errors import UserError
 from matbench.lock import locked
 from matbench.settings import Settings
 from matbench.status import prune, standing
 from matbench.store import FolderLost
+from matbench.stored import open_run
 from matbench.todo import explained, pending
 
 BEHAVED = Path(__file__).with_name("methods.py")
-PATIENCE = 300
+PATIENCE = 900
 
 PLUGIN = """
 import os
@@ -183,8 +185,10 @@ def _kill(process: psutil.Process) -> None:
 
 
 def test_a_second_process_is_refused_and_the_first_can_be_watched(tmp_path: Path) -> None:
-    run = tmp_path / "run"
-    line = command(BEHAVED, run, "-a", "flat", "slow")
+    run, plugin = tmp_path / "run", tmp_path / "plugin.py"
+    endless = "        while scene.height > 16 and context.seed:\n            time.sleep(1)\n        values ="
+    plugin.write_text("import time\n" + PLUGIN.replace("        values =", endless))
+    line = command(plugin, run, "-a", "seeded", "--seed", "0", "1")
     first = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     try:
         wait_until(lambda: any((run / "cells").glob("[0-9a-f]*")), "the first cell")
@@ -192,18 +196,16 @@ def test_a_second_process_is_refused_and_the_first_can_be_watched(tmp_path: Path
         assert second.returncode == 2
         assert second.stderr.count("\n") == 1
         assert f"is in use by process {first.pid} on " in second.stderr
-        for refused in (["export", str(run)], ["score", str(run)], ["status", str(run), "--prune"]):
-            told = subprocess.run(
-                [sys.executable, "-m", "matbench", *refused], capture_output=True, text=True, timeout=PATIENCE
-            )
-            assert told.returncode == 2, told.stdout
-            assert told.stderr.count("\n") == 1
-        wait_until(lambda: standing(run).running, "the slow cell")
+        with pytest.raises(UserError, match="is in use by process"):
+            prune(run)
+        with pytest.raises(UserError, match="is in use by process"):
+            open_run(run)[0].tables()
+        wait_until(lambda: standing(run).running, "the endless cell")
         found = standing(run)
         assert found.work is not None
         assert (found.work.pid, found.counts, found.left) == (first.pid, {"ok": 1}, 1)
-        assert [cell.method.algorithm for cell, _ in found.running] == ["slow"]
-        assert found.seconds_left is None, "nothing is known of the slow method"
+        assert [str(cell) for cell, _ in found.running] == [f"seeded on {SCENE}, seed 1"]
+        assert found.seconds_left is not None
     finally:
         os.killpg(first.pid, signal.SIGKILL)
         first.wait()
@@ -251,10 +253,10 @@ def test_a_full_disk_stops_the_run_and_the_same_command_ends_it(tmp_path: Path) 
     assert second.startswith("1\n")
     assert "status 0" in told.stdout
     assert "drafts are left" not in told.stdout
-    whole = matbench.compare(
-        ["flat", "noise", "flat[value=2]"], "synthetic/box[size=240x180]", out=tmp_path / "whole", plugin=BEHAVED
-    )
-    assert len(whole)
+    names, scene = ["flat", "noise", "flat[value=2]"], "synthetic/box[size=240x180]"
+    whole = comparison.prepare(names, scene, out=tmp_path / "whole", plugin=BEHAVED)
+    whole.run()
+    assert len(whole.tables()[0])
     assert (tmp_path / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
 
 
@@ -329,7 +331,7 @@ def test_only_and_the_dry_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 def _reason_of_first_cell(ready: comparison.Comparison) -> str:
     """The plan is from before its file was changed: such a cell must not be computed under the old key."""
-    again = evolve(ready, plan=evolve(ready.plan, cells=ready.plan.cells[:1]), settings=Settings(only="all"))
+    again = evolve(ready, settings=Settings(only="all"))
     again.run()
     outcome = again.store.outcome(again.plan.cells[0])
     assert outcome is not None
@@ -411,15 +413,13 @@ class _Malice:
         return os.mkdir, (self.path,)
 
 
-def test_what_changes_decides_what_is_done_again(tmp_path: Path) -> None:
+def test_what_changes_decides_what_is_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Methods' code and pixels: the cell. Truth and metrics: the scores. Other plug-ins' code: nothing."""
-    from scene_files import Layers, write_png
-
     scene, layers = tmp_path / "scene", Layers(width=72, height=40)
     scene.mkdir()
     for view in range(3):
         write_png(scene / f"v{view}.png", layers.view(view - 1))
-    write_png(scene / "truth.png", np.round((layers.truth() + 4) * 16).astype(np.uint8))
+    write_png(scene / "truth.png", np.round((layers.truth() + 2) * 16).astype(np.uint8))
     (scene / "scene.toml").write_text(
         'views = ["v0.png", "v1.png", "v2.png"]\ndisparities = [-2, 3]\nreference = "v1.png"\npair_steps = 1\n'
         '[truth."v1.png"]\nfile = "truth.png"\nscale = 16\nunknown = 0\n'
@@ -427,66 +427,71 @@ def test_what_changes_decides_what_is_done_again(tmp_path: Path) -> None:
     mine, other = tmp_path / "mine.py", tmp_path / "other.py"
     mine.write_text(PLUGIN)
     other.write_text(PLUGIN.replace("Steady", "Strange").replace("Seeded", "Sown"))
-    site = tmp_path / "site"
+    site = tmp_path / "site"  # a package with a metric, as if it were installed
     (site / "extra-1.0.dist-info").mkdir(parents=True)
     (site / "extra-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: extra\nVersion: 1.0\n")
     (site / "extra-1.0.dist-info" / "entry_points.txt").write_text("[matbench.metrics]\nmean = extra:METRIC\n")
-    metric = (
-        "from matbench.metrics import Metric\n"
-        "METRIC = Metric('mine', 'px', 'lower', 'a measure of mine', lambda e: {} * float(e.mean()))\n"
-    )
-    (site / "extra.py").write_text(metric.format(1))
+    monkeypatch.syspath_prepend(site)
     run = tmp_path / "run"
-    line = [sys.executable, "-m", "matbench", "compare", "-a", "steady", "seeded", "strange", "-s", str(scene)]
-    line += ["--plugin", str(mine), "--plugin", str(other), "--out", str(run)]
-    environment = {**os.environ, "PYTHONPATH": str(site)}
 
-    def matbench_(*more: str, tokens: list[str] = line) -> str:
-        told = subprocess.run([*tokens, *more], capture_output=True, text=True, timeout=PATIENCE, env=environment)
-        assert told.returncode == 0, told.stdout + told.stderr
-        return told.stdout
+    def measure(factor: int) -> None:
+        """Another version of that package; all that a new process would find out is forgotten."""
+        (site / "extra.py").write_text(
+            "from matbench.metrics import Metric\n"
+            f"METRIC = Metric('mine', 'px', 'lower', 'a measure of mine', lambda e: {factor}.0 * float(e.mean()))\n"
+        )
+        forget()
 
-    matbench_()
-    cells = {path: path.stat().st_mtime_ns for path in run.glob("cells/*/cell.json")}
-    assert len(cells) == 3
-    first = pd.read_csv(run / "results.csv")
+    def forget() -> None:
+        sys.modules.pop("extra", None)
+        importlib.invalidate_caches()
+        shutil.rmtree(site / "__pycache__", ignore_errors=True)
+        for cached in (plugins.installed, plugins.code_digest, scoring._metrics, scorer.digest):
+            cached.cache_clear()
+
+    def prepared(write: bool = False) -> comparison.Comparison:
+        names = ["steady", "seeded", "strange"]
+        return comparison.prepare(names, str(scene), out=run, plugin=[mine, other], write=write)
+
+    def why() -> list[str]:
+        ready = prepared()
+        return [f"{cell.method}: {why}" for cell, why in explained(ready.plan, ready.store, ready.settings)]
 
     def mean(name: str, table: pd.DataFrame) -> float:
-        return float(
-            table[(table.metric == name) & (table.region == "all") & (table.algorithm == "steady")].value.item()
-        )
+        one = (table.metric == name) & (table.region == "all") & (table.algorithm == "steady")
+        return float(table[one].value.item())
 
-    assert mean("mine", first) == pytest.approx(mean("avg", first))
+    measure(1)
+    try:
+        ready = prepared(write=True)
+        ready.run()
+        first, _ = ready.tables()
+        assert mean("mine", first) == pytest.approx(mean("avg", first))
+        cells = {path: path.stat().st_mtime_ns for path in run.glob("cells/*/cell.json")}
+        assert len(cells) == 3
+        assert standing(run).tables == ""
 
-    (site / "extra.py").write_text(metric.format(10))  # another scorer
-    status = [sys.executable, "-m", "matbench", "status", str(run)]
-    assert "tables are stale, they were made by another scorer" in matbench_(tokens=status)
-    truth = np.round((layers.truth() + 5) * 16).astype(np.uint8)
-    write_png(scene / "truth.png", truth)  # another truth
-    assert "3 of 3 cells stay as they are" in matbench_("--dry-run")
-    said = matbench_(tokens=[sys.executable, "-m", "matbench", "score", str(run)])
-    assert "scores are not what they were" in said
-    second = pd.read_csv(run / "results.csv")
-    assert mean("mine", second) == pytest.approx(10 * mean("avg", second))
-    assert mean("avg", second) != pytest.approx(mean("avg", first))
-    assert "tables are stale" not in matbench_(tokens=status)
+        measure(10)  # another scorer
+        assert "they were made by another scorer" in standing(run).tables
+        write_png(scene / "truth.png", np.round((layers.truth() + 3) * 16).astype(np.uint8))  # another truth
+        assert why() == []
+        again, left_out = open_run(run)
+        assert not left_out
+        second, _ = again.tables()
+        assert mean("mine", second) == pytest.approx(10 * mean("avg", second))
+        assert mean("avg", second) != pytest.approx(mean("avg", first))
+        assert standing(run).tables == ""
 
-    other.write_text(other.read_text() + "\n# longer\n")
-    said = matbench_("--dry-run")
-    assert "2 of 3 cells stay as they are" in said
-    assert "strange on" in said.splitlines()[1]
-    assert "code changed" in said.splitlines()[1]
-    assert {path: path.stat().st_mtime_ns for path in run.glob("cells/*/cell.json")} == cells
+        other.write_text(other.read_text() + "\n# longer\n")
+        assert why() == ["strange: code changed"]
+        assert {path: path.stat().st_mtime_ns for path in run.glob("cells/*/cell.json")} == cells
 
-    picture = layers.view(0)
-    picture[0, 0, 0] ^= 1
-    write_png(scene / "v1.png", picture)  # one bit of one pixel
-    said = matbench_("--dry-run")
-    assert "0 of 3 cells stay as they are" in said
-    assert said.count(": scene changed") == 2
-    assert said.count(": code and scene changed") == 1
-    refused = subprocess.run(
-        [sys.executable, "-m", "matbench", "score", str(run)], capture_output=True, text=True, env=environment
-    )
-    assert refused.returncode == 2
-    assert "its pixels, views or range have changed" in refused.stderr
+        picture = layers.view(0)
+        picture[0, 0, 0] ^= 1
+        write_png(scene / "v1.png", picture)  # one bit of one pixel
+        assert why() == ["steady: scene changed", "seeded: scene changed", "strange: code and scene changed"]
+        with pytest.raises(UserError, match="its pixels, views or range have changed"):
+            open_run(run)
+    finally:
+        monkeypatch.undo()
+        forget()
