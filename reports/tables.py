@@ -148,7 +148,7 @@ def timed_alike(cells: pd.DataFrame) -> pd.Series:
     names = ("machine", "threads")
     where = pd.Series("", cells.index)
     for name in names:
-        where += " " + cells.get(name, pd.Series("", cells.index)).fillna("").astype(str)
+        where += " " + cells.get(name, pd.Series("", cells.index)).astype(str)
     places = where[good].value_counts(sort=False)
     return good & (where == places.idxmax()) if len(places) else good
 
