@@ -15,7 +15,7 @@ from rich import console as rich_console
 from matbench import limits
 from matbench._version import __version__
 from matbench.errors import UserError
-from matbench.settings import Settings
+from matbench.settings import Only, Settings
 
 
 class Console(rich_console.Console):
@@ -48,6 +48,8 @@ app = App(
 `matbench ablate 'materiality[pairs=all,consecutive]' -s 'middlebury*/*' --data DATA`
 
 `matbench check mine.py`  does a method of your own keep to what is asked of it?
+
+`matbench status runs/1a2b3c4d`  where a run stands, also while it runs
 
 `matbench list`  methods with their parameters, scenes, metrics
 
@@ -112,6 +114,16 @@ class Options:
         Parameter(help="Dask scheduler that hands out the cells, tcp://HOST:PORT; or local: JOBS workers here."),
     ] = None
 
+    only: Annotated[
+        Only | None,
+        Parameter(
+            help="`missing`: cells never computed, `failed`: those that did not end well, `all`: every cell again; "
+            "default what is not done."
+        ),
+    ] = None
+    repeats: Annotated[str, Parameter(help="Solve every cell so often: does a method repeat itself?")] = "1"
+    dry_run: Annotated[bool, Parameter(negative="", help="Only say what would run, and why.")] = False
+
     @property
     def settings(self) -> Settings:
         """How to run, but for what is kept."""
@@ -123,6 +135,7 @@ class Options:
             threads=self.threads,
             isolation=self.isolation,
             dask=self.dask,
+            only=self.only,
         )
 
     @property
@@ -186,7 +199,7 @@ def compare(
     from matbench import comparison
     from matbench.commands import running
 
-    _check_metric(options.metric)
+    check_metric(options.metric)
     if row is not None and not record:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
@@ -203,8 +216,10 @@ def compare(
         out=options.out,
         seed=options.seeds,
         plugin=options.plugin,
+        repeats=_whole("repeats", options.repeats),
+        write=not options.dry_run,
     )
-    return running.work(ready, options.metric)
+    return running.show_plan(ready) if options.dry_run else running.work(ready, options.metric)
 
 
 @app.command(help_epilogue="")
@@ -239,7 +254,7 @@ def ablate(
     from matbench.commands import running
     from matbench.plan import methods
 
-    _check_metric(options.metric)
+    check_metric(options.metric)
     algorithms: list[str] = [selector]
     if selector.endswith(".toml"):
         algorithms, listed = comparison.read_request(Path(selector))
@@ -253,7 +268,11 @@ def ablate(
         out=options.out,
         seed=options.seeds,
         plugin=options.plugin,
+        repeats=_whole("repeats", options.repeats),
+        write=not options.dry_run,
     )
+    if options.dry_run:
+        return running.show_plan(ready)
     return running.work(ready, options.metric, is_ablation=any(ablation.factors(chosen).values()))
 
 
@@ -264,7 +283,7 @@ def _whole(name: str, text: str) -> int:
     return int(text)
 
 
-def _check_metric(metric: str) -> None:
+def check_metric(metric: str) -> None:
     from matbench import scoring
     from matbench.errors import unknown
 
@@ -336,6 +355,11 @@ def view(
 
 
 app.command("matbench.commands.check:app", name="check", help="Try methods: do they keep to what is asked of them?")
+app.command("matbench.commands.status:app", name="status", help="Show where a run stands, also while it runs.")
+app.command("matbench.commands.score:app", name="score", help="Score stored maps again: no method runs.")
+app.command(
+    "matbench.commands.export:app", name="export", help="Make one archive of a run: all that checks its tables."
+)
 app.command("matbench.commands.fetch:app", name="fetch", help="Download scenes, check them, and put them in place.")
 app.command("matbench.commands.scene:app", name="scene", help="Look at scenes, check them, and make your own.")
 

@@ -1,12 +1,10 @@
 """A whole comparison: choose methods and scenes, run, score, report. Where the parts are put together."""
 
 import operator
-import platform
 import shlex
 import sys
 import tomllib
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,15 +12,16 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from matbench import limits, plugins, run, scoring, spec
-from matbench._version import __version__
+from matbench import plugins, provenance, run, scorer, scoring, spec
 from matbench.dataset import Listing
 from matbench.errors import UserError, unknown
-from matbench.plan import Plan, make_plan, methods
+from matbench.lock import locked
+from matbench.plan import Cell, Plan, make_plan, methods
+from matbench.repeats import unsteady
 from matbench.scene import NotInScene, Scene
 from matbench.scenes import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
 from matbench.settings import Settings
-from matbench.store import Store, write_text
+from matbench.store import FolderLost, Outcome, Store, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,19 +58,45 @@ class Comparison:
         return self.store.folder
 
     def run(self, listen: run.Listener | None = None) -> None:
-        """Compute what is not done yet."""
+        """Compute what is not done yet.
+
+        Raises
+        ------
+        FolderLost
+            If the run folder cannot be used any more.
+        UserError
+            If another process works on it.
+        """
+        tell = listen or (lambda *_: None)
         names = {cell.method.algorithm for cell in self.plan.cells}
         found = plugins.algorithms([Path(file) for file in self.plan.plugin_files])
         entries = [found[name].entry for name in sorted(names)]
         preload = [entry.module for entry in entries if not isinstance(entry, type)]
-        run.run(self.plan, self.store, self.settings, preload, listen)
+        with locked(self.folder) as work, provenance.commit_known():
+
+            def listening(event: run.Event, cell: Cell, outcome: Outcome | None) -> None:
+                if event == "start":
+                    work.start(cell.key)
+                else:
+                    work.end(cell.key)
+                    if outcome is not None and self.store.outcome(cell, whole=False) is None:  # it was not kept
+                        self.store.try_out()
+                tell(event, cell, outcome)
+
+            try:
+                self.store.write_plan(self.plan)
+                run.run(self.plan, self.store, self.settings, preload, listening)
+            except OSError as error:
+                raise FolderLost.of(self.folder, error) from error
 
     def tables(self) -> "tuple[pd.DataFrame, pd.DataFrame]":
         """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
         results = scoring.results(self.plan, self.store, self.scenes)
         cells = scoring.cells(self.plan, self.store)
-        for name, table in (("results.csv", results), ("cells.csv", cells)):
-            write_text(self.folder / name, table.to_csv(index=False))
+        with locked(self.folder):
+            for name, table in (("results.csv", results), ("cells.csv", cells)):
+                write_text(self.folder / name, table.to_csv(index=False))
+            scorer.record(self.plan, self.store, self.scenes)
         return results, cells
 
     def sweeps(self, results: "pd.DataFrame") -> "list[Sweep]":
@@ -106,7 +131,7 @@ class Comparison:
         reliability = scoring.reliabilities(self.plan, self.store, self.scenes)
         if len(reliability):
             write_text(self.folder / "reliability.csv", reliability.to_csv(index=False))
-        stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.cells}
+        stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.scored}
         path = self.folder / "report.html"
 
         def disparity(algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
@@ -125,7 +150,7 @@ class Comparison:
                 cells=cells,
                 maps=disparity,
                 scenes=self.scenes,
-                facts=machine(),
+                facts=self._facts(cells),
                 ablation=ablation,
                 sweeps=tuple(sweeps),
                 reliability=reliability,
@@ -134,26 +159,19 @@ class Comparison:
         )
         return path
 
+    def _facts(self, cells: "pd.DataFrame") -> dict[str, str]:
+        """What the cells ran on, each on its own: a run may go on elsewhere."""
+        from matbench.reports import tables
 
-def machine() -> dict[str, str]:
-    """What a run ran on: versions, processor, threads."""
-    libraries = ("numpy", "numba", "opencv-python-headless", "scipy", "rerun-sdk")
-    return {
-        "matbench": __version__,
-        "python": platform.python_version(),
-        **{name: version(name) for name in libraries},
-        "system": f"{platform.system()} {platform.machine()}",
-        "processor": _processor(),
-        "threads": str(limits.cores()),
-    }
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor() or "unknown"
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
+        outcomes = [o for o in (self.store.outcome(cell, whole=False) for cell in self.plan.cells) if o is not None]
+        threads = [{"threads": str(o.threads)} for o in outcomes if o.threads]
+        seeds = {"seeds": ", ".join(str(seed) for seed in self.plan.request["seeds"]), "scorer": scorer.digest()}
+        facts = {**provenance.combined([*(o.ran_on for o in outcomes), *threads]), **seeds}
+        if differing := unsteady(self.plan, self.store):
+            facts["not repeatable"] = "; ".join(differing)
+        if note := tables.timing_note(cells):
+            facts["times"] = note
+        return facts
 
 
 def default_algorithms() -> list[str]:
@@ -215,11 +233,15 @@ def prepare(
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     command: str | None = None,
+    repeats: int = 1,
+    write: bool = True,
 ) -> Comparison:
     """Check everything that was asked for, read every scene, and only then write the plan.
 
-    Parameters are those of `compare`.
+    Parameters are those of `compare`; without `write` not even the plan is written.
     """
+    if not 1 <= repeats <= 100:
+        raise UserError(f"repeats {repeats} is not a whole number from 1 to 100")
     row = settings.row
     files = [Path(file).resolve() for file in ([plugin] if isinstance(plugin, str | Path) else plugin)]
     seeds = _seeds(seed)
@@ -254,10 +276,17 @@ def prepare(
     if not loaded:
         raise UserError(f"no scene has the views asked for: {', '.join(selected.names)}")
     by_name = {scene.name: scene for scene in loaded.values()}
-    plan = make_plan(chosen, by_name, seeds, files, spellings)
+    if len(by_name) < len(loaded):
+        twice = next(name for name in by_name if sum(scene.name == name for scene in loaded.values()) > 1)
+        raise UserError(f"two different scenes are called {twice}: scores of both cannot stand in one table")
+    plan = make_plan(chosen, by_name, seeds, files, spellings, repeats)
     folder = Path(out) if out is not None else RUNS / plan.digest
-    store = Store.open(folder, plan)
     said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
+    if write:
+        store = Store.open(folder, plan, said)
+    else:
+        store = Store(folder)
+        store.check(plan)
     return Comparison(plan, store, by_name, evolve(settings, data=root), said, left_out)
 
 
@@ -272,6 +301,7 @@ def compare(
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
     row: int | None = None,
+    repeats: int = 1,
     settings: Settings = Settings(),
 ) -> "pd.DataFrame":
     """Run methods on scenes and score them; the run folder stays for `matbench view` and the report.
@@ -299,8 +329,10 @@ def compare(
         Python files that hold further methods.
     row
         The image row whose epipolar slices recordings show; the middle one if not given.
+    repeats
+        How often every cell is solved; more than once shows whether a method repeats itself.
     settings
-        Limits, cells at once, a cluster: the fields of `Settings` that are no parameters here.
+        Limits, cells at once, a cluster, which cells: the fields of `Settings` that are no parameters here.
 
     Returns
     -------
@@ -322,8 +354,10 @@ def compare(
         seed=seed,
         plugin=plugin,
         command="matbench.compare(...)",
+        repeats=repeats,
     )
-    comparison.run()
-    results, cells = comparison.tables()
-    comparison.report(results, cells, sweeps=comparison.sweeps(results))
+    with locked(comparison.folder):
+        comparison.run()
+        results, cells = comparison.tables()
+        comparison.report(results, cells, sweeps=comparison.sweeps(results))
     return results

@@ -53,6 +53,8 @@ class Cell:
     ----------
     key
         Digest of everything that decides the answer; the name of the cell's folder.
+    repeat
+        0 is the cell that is scored; others solve the same again, to see whether the maps are the same.
     """
 
     method: Method
@@ -60,9 +62,17 @@ class Cell:
     scene_digest: str
     seed: int
     key: str
+    repeat: int = 0
+
+    @property
+    def question(self) -> tuple[str, str, str, int, int]:
+        """What is asked, whatever the code and the pixels: algorithm, parameters, scene, seed and repeat."""
+        params = json.dumps(dict(self.method.params), sort_keys=True)
+        return self.method.algorithm, params, self.scene, self.seed, self.repeat
 
     def __str__(self) -> str:
-        return f"{self.method} on {self.scene}" + (f", seed {self.seed}" if self.seed else "")
+        seed = f", seed {self.seed}" if self.seed else ""
+        return f"{self.method} on {self.scene}{seed}" + (f", repeat {self.repeat}" if self.repeat else "")
 
 
 @frozen
@@ -82,6 +92,11 @@ class Plan:
     cells: tuple[Cell, ...]
     plugin_files: tuple[str, ...] = field(default=())
     spellings: Mapping[str, str] = field(factory=dict)
+
+    @property
+    def scored(self) -> tuple[Cell, ...]:
+        """The cells that scores are computed from: no repeats."""
+        return tuple(cell for cell in self.cells if not cell.repeat)
 
     @property
     def request(self) -> dict[str, Any]:
@@ -128,12 +143,15 @@ def make_plan(
     seeds: Sequence[int],
     files: Sequence[Path] = (),
     spellings: Mapping[str, str] | None = None,
+    repeats: int = 1,
 ) -> Plan:
-    """Every method on every scene with every seed."""
+    """Every method on every scene with every seed, solved `repeats` times."""
     cells = []
     for name, scene in scenes.items():
         for method in chosen:
             for seed in seeds:
                 facts = [SCHEMA, method.algorithm, dict(method.params), method.code, name, scene.digest, seed]
-                cells.append(Cell(method, name, scene.digest, seed, digest(facts)))
+                for repeat in range(repeats):
+                    key = digest([*facts, repeat] if repeat else facts)
+                    cells.append(Cell(method, name, scene.digest, seed, key, repeat))
     return Plan(tuple(cells), tuple(str(path) for path in files), spellings or {})

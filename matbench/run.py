@@ -13,30 +13,12 @@ from matbench import plugins
 from matbench.keeper import Keeper, dismiss
 from matbench.plan import Cell, Plan
 from matbench.settings import Settings
-from matbench.store import FINAL, Outcome, Store
+from matbench.store import Outcome, Store
+from matbench.todo import pending
 from matbench.worker import Job
 
 Event = Literal["start", "done"]
 Listener = Callable[[Event, Cell, Outcome | None], None]
-
-
-def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
-    """The cells that still have to be computed: those without a final outcome, or without what was asked for besides.
-
-    That is a recording that shows the row asked for, and the volume of a method that has one.
-    """
-
-    def is_done(cell: Cell) -> bool:
-        outcome = store.outcome(cell)
-        if outcome is None or outcome.status not in FINAL:
-            return False
-        if settings.volumes and outcome.has_volume and store.volume(cell) is None:
-            return False
-        if not settings.record or outcome.status != "ok":
-            return True
-        return (store.cell(cell) / "recording.rrd").exists() and settings.row in (None, outcome.row)
-
-    return [cell for cell in plan.cells if not is_done(cell)]
 
 
 @contextmanager

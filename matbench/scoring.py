@@ -12,6 +12,7 @@ from matbench.errors import UserError
 from matbench.metrics import Metric, score, value_of
 from matbench.plan import Cell, Plan
 from matbench.prediction import PredictionMetric, differences
+from matbench.repeats import repeats
 from matbench.scene import Scene
 from matbench.store import Store
 from matbench.volume_metrics import VolumeMetric, reliability
@@ -34,6 +35,9 @@ CELL_COLUMNS = (
     "work",
     "reason",
     "cell",
+    "machine",
+    "maps",
+    "repeats",
 )
 
 
@@ -77,19 +81,35 @@ def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFra
     Columns are `RESULT_COLUMNS`: shares in per cent of `pixels`, errors in pixels of the pair.
     Volumes have rows where they were kept. The prediction of a view held out has one region,
     ``all``, and that view's label.
+
+    Raises
+    ------
+    UserError
+        If a scene is not the one that the maps are of.
     """
     rows: list[tuple[object, ...]] = []
-    for cell in plan.cells:
+    for cell in plan.scored:
         outcome = store.outcome(cell)
         if outcome is None or outcome.status != "ok":
             continue
         scene = scenes[cell.scene]
+        _check_scene(cell, scene, store)
         rows += _of_maps(cell, scene, store.disparity(cell)[scene.ref])
         if outcome.has_volume:
             rows += _of_volumes(cell, scene, store.volume(cell))
         if scene.held_out is not None:
             rows += _predicted(cell, scene, store.disparity(cell)[scene.ref])
     return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
+
+
+def _check_scene(cell: Cell, scene: Scene, store: Store) -> None:
+    """Refuse to score maps against another scene than that which was solved."""
+    if scene.digest != cell.scene_digest:
+        raise UserError(f"{cell.scene} is not what {cell.method} was given: it cannot be scored with the others")
+    maps = store.disparity(cell)
+    sizes = {values.shape for values in maps.values()}
+    if scene.ref not in maps or sizes != {(scene.height, scene.width)}:
+        raise UserError(f"{store.cell(cell) / 'disparity.npz'} holds no maps of {cell.scene}: remove {cell.key}")
 
 
 def _head(cell: Cell, view: str, region: str) -> tuple[object, ...]:
@@ -128,7 +148,7 @@ def reliabilities(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.D
     Columns: algorithm, params, scene, seed, and those of `matbench.volume_metrics.reliability`.
     """
     curves = []
-    for cell in plan.cells:
+    for cell in plan.scored:
         outcome, scene = store.outcome(cell), scenes[cell.scene]
         kept = store.volume(cell) if outcome is not None and outcome.has_volume else None
         if kept is None or scene.ref not in kept.views or scene.ref not in scene.truth:
@@ -144,13 +164,19 @@ def reliabilities(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.D
 def cells(plan: Plan, store: Store) -> pd.DataFrame:
     """One row for each cell of the plan: what became of it and what it cost (`CELL_COLUMNS`)."""
     rows: list[tuple[object, ...]] = []
-    for cell in plan.cells:
+    repeated = repeats(plan, store)
+    for cell in plan.scored:
         outcome = store.outcome(cell)
         head = (cell.method.algorithm, cell.method.changed, cell.scene, cell.seed)
         if outcome is None:
-            rows.append((*head, "interrupted", None, None, None, None, None, "", "not computed yet", cell.key))
+            rows.append((*head, "interrupted", *[None] * 5, "", "not computed yet", cell.key, "", "", ""))
             continue
+        found = repeated.get(cell.key)
+        status, reason = outcome.status, outcome.reason
+        if found is not None and found.failed is not None and status == "ok":
+            status, reason = found.failed[1].status, f"repeat {found.failed[0].repeat}: {found.failed[1].reason}"
+        told = (cell.key, outcome.ran_on.get("machine", ""), outcome.maps, str(found or ""))
         cost = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb, outcome.threads, outcome.alone)
         work = " ".join(f"{name}={count}" for name, count in outcome.work.items())
-        rows.append((*head, outcome.status, *cost, work, outcome.reason, cell.key))
+        rows.append((*head, status, *cost, work, reason, *told))
     return pd.DataFrame(rows, columns=list(CELL_COLUMNS))

@@ -1,10 +1,14 @@
 """How a plan is worked through: where scenes lie, what is kept of each cell besides its maps, and what it may take."""
 
 from pathlib import Path
+from typing import Literal
 
 from attrs import field, frozen
+from attrs.validators import in_
 
 from matbench import limits
+
+Only = Literal["missing", "failed", "all"]
 
 
 @frozen
@@ -21,6 +25,9 @@ class Settings:
         The image row that recordings show; the middle one of each scene if None.
     volumes
         Keep the volumes of the methods that have one.
+    only
+        Which cells: ``missing`` were never computed, ``failed`` did not end well, ``all`` again; if
+        None, whatever is not done.
     timeout
         Seconds that a cell may take, all told: reading the scene, warm-up, solve, recording. None for no limit.
     memory
@@ -47,6 +54,7 @@ class Settings:
     record: bool = False
     row: int | None = None
     volumes: bool = False
+    only: Only | None = field(default=None, validator=in_((None, "missing", "failed", "all")))
     timeout: float | None = field(default=limits.HOUR, converter=limits.seconds)
     memory: int | None = field(default=None, converter=limits.mebibytes)
     jobs: int = field(default=1, converter=limits.jobs)

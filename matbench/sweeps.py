@@ -148,7 +148,7 @@ def _cells(plan: Plan) -> pd.DataFrame:
         spelled[kept].append(name)
     rows = [
         (c.method, c.method.algorithm, c.method.changed, c.scene, c.seed, one.name, one.options)
-        for c in plan.cells
+        for c in plan.scored
         for one in map(spec.read_scene, spelled[c.scene])
     ]
     columns = ["method", "algorithm", "params", "scene", "seed", "base", "options"]

@@ -176,9 +176,9 @@ def run_cell(job: Job, draft: Path) -> Outcome:
     maps = volume = None
     try:
         plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
-        if plugins.code_digest(plugin) != cell.method.code:
-            raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
         method = spec.build(plugin.name, plugin.load(), cell.method.params)
+        if plugins.method_digest(plugin, method) != cell.method.code:
+            raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
         scene = hide_truth(load_scene(cell.scene, job.settings.data))
         if scene.digest != cell.scene_digest:
             raise UserError(f"{cell.scene} is not what it was when the run was planned")
@@ -188,7 +188,7 @@ def run_cell(job: Job, draft: Path) -> Outcome:
         if evolve(scene).digest != cell.scene_digest:
             raise ValueError("the method wrote into its input")
         os.chdir(place)
-        if job.settings.record and outcome.status == "ok":
+        if job.settings.record and not cell.repeat and outcome.status == "ok":
             outcome = _record(method, job, draft / "recording.rrd", outcome)
     except BaseException as error:  # SystemExit and KeyboardInterrupt, too: no signal comes here
         if os.getpid() != process:

@@ -137,10 +137,35 @@ def over_scenes(table: pd.DataFrame, scope: Shared) -> pd.Series:
     return pd.Series({m: table.loc[chosen[m], m].mean(skipna=False) for m in scope.methods}, dtype=float)
 
 
+def timed_alike(cells: pd.DataFrame) -> pd.Series:
+    """Which cells' seconds may be compared, as a mask.
+
+    Those taken while no other cell ran, on one machine with one number of threads: where there are
+    several, that which has the most cells.
+    """
+    alone = cells.get("alone", pd.Series(True, cells.index)).astype(str) != "False"
+    good = (cells["status"] == "ok") & alone
+    names = ("machine", "threads")
+    where = pd.Series("", cells.index)
+    for name in names:
+        where += " " + cells.get(name, pd.Series("", cells.index)).astype(str)
+    places = where[good].value_counts(sort=False)
+    return good & (where == places.idxmax()) if len(places) else good
+
+
+def timing_note(cells: pd.DataFrame) -> str:
+    """What is to be said of times that are not compared; empty if all are."""
+    ok = int((cells["status"] == "ok").sum())
+    alike = int(timed_alike(cells).sum())
+    if alike == ok:
+        return ""
+    return f"time: of {alike} of {ok} cells; the others ran on another machine or not alone"
+
+
 def seconds(cells: pd.DataFrame, scope: Shared) -> pd.Series:
-    """Method -> mean wall time per scene, over the same scenes as its scores."""
+    """Method -> mean wall time per scene, over the same scenes as its scores; NaN unless all are `timed_alike`."""
     planned = labelled(cells)
-    good = planned[planned["status"] == "ok"]
+    good = planned[timed_alike(planned)]
     table = good.assign(seconds=good["seconds"].astype(float)).groupby(["scene", "method"])["seconds"].mean()
     wide = table.unstack("method").reindex(index=list(scope.asked), columns=list(scope.methods))
     return pd.Series({m: wide.loc[list(scope.counted(m)), m].mean(skipna=False) for m in scope.methods}, dtype=float)

@@ -20,6 +20,7 @@ from matbench.reports.tables import (
     shared,
     summarised,
     summary,
+    timing_note,
 )
 from matbench.reports.tables import text as shown
 from matbench.statistics import FEW
@@ -44,6 +45,8 @@ def tables(
         if width < WIDTH:
             heads = {column: head for column, head in heads.items() if column.split()[-1] not in NARROW}
         out.append(_summary(results, cells, scope, metric, higher, "by region", heads))
+        if note := timing_note(cells):
+            out[-1].caption, out[-1].caption_justify = Text(note), "left"
         over_views = [r for r in summarised(results) if r in VIEWS]
         if per_scene(results, VIEWS[0], metric).notna().any(axis=None):
             heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in over_views}

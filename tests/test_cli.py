@@ -81,8 +81,10 @@ def test_compare_prints_tables_and_says_where_things_are(capsys: pytest.CaptureF
     assert "flat[value=3.0]" in out
     assert str(tmp_path / "r" / "report.html") in out
     assert {p.name for p in (tmp_path / "r").iterdir()} == {
+        ".lock",
         "plan.json",
         "cells",
+        "scores.json",
         "results.csv",
         "cells.csv",
         "report.html",

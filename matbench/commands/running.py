@@ -13,10 +13,13 @@ from matbench import scoring
 from matbench.cli import DONE, FAILED, INTERRUPTED, Console
 from matbench.comparison import Comparison
 from matbench.limits import crowded
+from matbench.lock import locked
+from matbench.repeats import unsteady
 from matbench.reports import curves, tables
 from matbench.reports import switches as effects
-from matbench.run import pending
 from matbench.scenes import DATA_VARIABLE, data_root
+from matbench.store import FolderLost
+from matbench.todo import explained, pending
 
 
 def work(ready: Comparison, metric: str, is_ablation: bool = False) -> int:
@@ -26,12 +29,48 @@ def work(ready: Comparison, metric: str, is_ablation: bool = False) -> int:
         console.say(f"without {', '.join(scenes)}: {reason}")
     if ready.settings.dask is None and (crowd := crowded(ready.settings.jobs, ready.settings.threads_each())):
         console.say(crowd)
-    stopped = _run(ready, console)
+    with locked(ready.folder):
+        try:
+            stopped = _run(ready, console)
+            cells = publish(ready, metric, is_ablation, console)
+        except FolderLost as error:
+            console.say(f"stopped: {error}")
+            return FAILED
+        except OSError as error:  # the tables are what does not fit any more
+            console.say(f"stopped: {FolderLost.of(ready.folder, error)}")
+            return FAILED
+    if stopped:
+        console.say("interrupted: the same command goes on from here")
+        return INTERRUPTED
+    return DONE if cells["status"].isin(["ok", "skipped"]).all() else FAILED
+
+
+def show_plan(ready: Comparison) -> int:
+    """Say what a run would do, and why; nothing is written."""
+    console = Console()
+    for reason, scenes in ready.left_out.items():
+        console.say(f"without {', '.join(scenes)}: {reason}")
+    todo = explained(ready.plan, ready.store, ready.settings)
+    total = len(ready.plan.cells)
+    console.say(f"{total - len(todo)} of {total} cells stay as they are in {ready.folder}, {len(todo)} would run")
+    for cell, why in todo:
+        console.say(f"  {cell}: {why}")
+    if stale := len(ready.store.stale(ready.plan)):
+        console.say(f"{stale} stored cells are of other code or pixels")
+    return DONE
+
+
+def publish(ready: Comparison, metric: str, is_ablation: bool, console: Console, say_paths: bool = True) -> Any:
+    """Score, write and print tables and report; the table of cells."""
     results, cells = ready.tables()
     sweeps = ready.sweeps(results)
     switches = ready.ablation(results) if is_ablation else None
     report = ready.report(results, cells, switches, sweeps)
     _print_tables(results, cells, switches, sweeps, metric, console)
+    for line in unsteady(ready.plan, ready.store):
+        console.say(f"does not repeat itself: {line}")
+    if not say_paths:
+        return cells
     written = {"scores": ready.folder / "results.csv", "report": report}
     if sweeps:
         written["curves"] = ready.folder / "sweeps.csv"
@@ -41,10 +80,11 @@ def work(ready: Comparison, metric: str, is_ablation: bool = False) -> int:
         console.say(f"{what}: {path}")
     if any(ready.folder.glob("cells/*/recording.rrd")):
         console.say(f"recordings: matbench view {ready.folder}")
-    if stopped:
-        console.say("interrupted: the same command goes on from here")
-        return INTERRUPTED
-    return DONE if cells["status"].isin(["ok", "skipped"]).all() else FAILED
+    if stale := len(ready.store.stale(ready.plan)):
+        console.say(
+            f"{stale} stored cells are of other code or pixels: matbench status {ready.folder} --prune removes them"
+        )
+    return cells
 
 
 def say_missing(missing: Sequence[str], data: Path | None) -> None:
@@ -60,7 +100,8 @@ def _run(ready: Comparison, console: Console) -> bool:
     todo = len(pending(ready.plan, ready.store, ready.settings))
     total = len(ready.plan.cells)
     if todo < total:
-        console.say(f"{total - todo} of {total} cells are done already in {ready.folder}")
+        what = "are done already" if ready.settings.only is None else "stay as they are"
+        console.say(f"{total - todo} of {total} cells {what} in {ready.folder}")
     columns = (BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("starting", total=total, completed=total - todo)

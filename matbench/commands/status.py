@@ -1,0 +1,114 @@
+"""`matbench status`: where a run stands."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from matbench.cli import DONE, Console
+from matbench.status import Standing, prune, standing
+
+app = App(
+    name="status",
+    help="Show where a run stands, also while it runs.",
+    help_epilogue="""\
+**Examples**
+
+`matbench status runs/1a2b3c4d`
+
+`watch matbench status runs/1a2b3c4d`  while it runs in another terminal
+
+`matbench status runs/1a2b3c4d --json`
+
+`matbench status runs/1a2b3c4d --prune`  remove what earlier code left
+""",
+    help_format="markdown",
+)
+
+
+@app.default
+def status(
+    run: Path,
+    /,
+    *,
+    as_json: Annotated[bool, Parameter(name="--json", negative="", help="Machine-readable.")] = False,
+    remove: Annotated[
+        bool,
+        Parameter(name="--prune", negative="", help="Remove stored cells of code or pixels that have changed since."),
+    ] = False,
+) -> int:
+    """Show what is done, what failed, what runs and what is left of a run.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+    """
+    removed = prune(run) if remove else 0
+    found = standing(run)
+    if as_json:
+        print(json.dumps(_json(found), indent=1))
+        return DONE
+    console = Console()
+    if removed:
+        console.say(f"{removed} stored cells of other code or pixels removed")
+    for line in _lines(found):
+        console.say(line)
+    return DONE
+
+
+def _lines(found: Standing) -> list[str]:
+    done = sum(found.counts.values()) - found.failed
+    ended = ", ".join(f"{count} {status}" for status, count in found.counts.items()) or "none ended"
+    lines = [f"{found.folder}: {done} of {found.cells} cells done, {found.left} left ({ended})"]
+    if found.work:
+        elapsed = time_text(_age(found))
+        lines.append(f"running for {elapsed}, process {found.work.pid} on {found.work.host}")
+        lines += [f"  {cell}, for {time_text(spent)}" for cell, spent in found.running]
+    elif found.left:
+        lines.append("not running: the command that began it goes on from here")
+    if found.left:
+        guess = "not known yet" if found.seconds_left is None else f"about {time_text(found.seconds_left)}"
+        lines.append(f"time left: {guess}")
+    if found.stale:
+        size = found.stale_bytes / 2**20
+        lines.append(f"{found.stale} stored cells ({size:.1f} MiB) are of other code or pixels; --prune removes them")
+    if found.tables and not found.work:
+        lines.append(f"tables are stale, {found.tables}: type matbench score {found.folder}")
+    return lines
+
+
+def time_text(seconds: float) -> str:
+    """A time as people say it.
+
+    >>> time_text(42), time_text(200), time_text(9000)
+    ('42 s', '3 min', '2 h 30 min')
+    """
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def _age(found: Standing) -> float:
+    import time
+
+    return max(0.0, time.time() - found.work.since) if found.work else 0.0
+
+
+def _json(found: Standing) -> dict[str, object]:
+    work = found.work and {"pid": found.work.pid, "host": found.work.host, "seconds": _age(found)}
+    return {
+        "cells": found.cells,
+        "done": sum(found.counts.values()) - found.failed,
+        "failed": found.failed,
+        "left": found.left,
+        "statuses": dict(found.counts),
+        "process": work,
+        "running": [{"cell": str(cell), "key": cell.key, "seconds": spent} for cell, spent in found.running],
+        "seconds_left": found.seconds_left,
+        "stale": found.stale,
+        "stale_bytes": found.stale_bytes,
+        "tables": found.tables or "current",
+    }
