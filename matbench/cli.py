@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from attrs import field, frozen
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
 from rich import console as rich_console
 
 from matbench._version import __version__
@@ -55,6 +55,10 @@ app = App(
 `matbench view runs/1a2b3c4d`  open a recording
 
 `matbench scene check my_scene`  a scene of your own, a folder: is it what it says?
+
+**Exit status**
+
+0 all well, 1 cells failed, 2 wrong usage, 3 slower or worse than the baseline, 130 interrupted
 """,
     help_format="markdown",
     version=__version__,
@@ -91,6 +95,24 @@ class Options:
     ] = field(factory=lambda: ["0"])
     plugin: Plugins = field(factory=list)
     metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1"
+    quiet: Annotated[
+        bool,
+        Parameter(
+            name=["--quiet", "-q"],
+            negative="",
+            show_default=False,
+            help="Print nothing but the run folder, and what failed as errors.",
+        ),
+    ] = False
+    as_json: Annotated[
+        bool,
+        Parameter(
+            name="--json",
+            negative="",
+            show_default=False,
+            help="Print one JSON document at the end: folder, cells, table; progress goes to the error stream.",
+        ),
+    ] = False
 
     @property
     def seeds(self) -> list[int]:
@@ -143,6 +165,10 @@ def compare(
     `matbench compare -a materiality -s synthetic/box -m surface_f_1`
 
     `matbench compare -s 'synthetic/*[predict=right]' -m prediction_psnr`
+
+    In a script, where the exit status tells 0 all well, 1 cells failed, 2 wrong usage, 130 interrupted:
+
+    `matbench compare -a sgbm -s synthetic/box --json`
     """
     from matbench import comparison
     from matbench.commands import running
@@ -151,7 +177,7 @@ def compare(
     if row is not None and not record:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
-        running.say_missing(comparison.default_scenes(options.data)[1], options.data)
+        running.say_missing(comparison.default_scenes(options.data)[1], options)
     ready = comparison.prepare(
         algorithm,
         scene,
@@ -162,7 +188,7 @@ def compare(
         seed=options.seeds,
         plugin=options.plugin,
     )
-    return running.work(ready, options.metric)
+    return running.work(ready, options)
 
 
 @app.command(help_epilogue="")
@@ -212,7 +238,7 @@ def ablate(
         seed=options.seeds,
         plugin=options.plugin,
     )
-    return running.work(ready, options.metric, is_ablation=any(ablation.factors(chosen).values()))
+    return running.work(ready, options, is_ablation=any(ablation.factors(chosen).values()))
 
 
 def _whole(name: str, text: str) -> int:
@@ -304,6 +330,10 @@ def main(tokens: Sequence[str] | None = None) -> None:
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except UserError as error:
         status = _refuse(str(error))
+    except UnusedCliTokensError as error:
+        command = " ".join(("matbench", *(error.command_chain or ())))
+        extra = " ".join(error.unused_tokens or ())
+        status = _refuse(f"{extra!r} belongs to no option of {command}; {command} --help lists them")
     except CycloptsError as error:
         status = _refuse(" ".join(str(error).split()))
     except KeyboardInterrupt:

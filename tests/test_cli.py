@@ -27,7 +27,7 @@ def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str
     ("tokens", "said"),
     [
         (["-a", "sgmb"], "unknown algorithm 'sgmb': did you mean 'sgbm'?"),
-        (["-a", "sgbm[fil=no]"], "unknown parameter of sgbm 'fil': did you mean 'fill'?"),
+        (["-a", "sgbm[fil=no]"], "unknown parameter 'fil' of sgbm: did you mean 'fill'?"),
         (["-a", "sgbm[fill=maybe]"], "sgbm: fill=maybe is not true or false"),
         (["-a", "sgbm["], "cannot read 'sgbm['"),
         (["-s", "middelbury2003/teddy"], "unknown dataset 'middelbury2003': did you mean 'middlebury2003'?"),
