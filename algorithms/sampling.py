@@ -1,4 +1,4 @@
-"""Image rows sampled finer than a pixel, so that fine planes have whole-number homologues (SPEC 1)."""
+"""Image rows sampled finer than a pixel, so that fine planes have whole-number homologues (docs/concepts/disparity-space.md)."""
 
 from math import ceil
 

@@ -1,6 +1,6 @@
 """Draw ``docs/images/disparity-space.svg``: pixel rays and target points, seen from above and in disparity space.
 
-    python docs/disparity_space.py
+python docs/disparity_space.py
 """
 
 from pathlib import Path
@@ -56,8 +56,9 @@ def main() -> None:
         axes.spines[["top", "right"]].set_visible(False)
     for view, colour in enumerate(COLOURS):
         scene.plot([view], [0], marker="^", ms=10, color=colour, clip_on=False, zorder=5)
-        scene.annotate(f"image {view}", (view, 0), (0, -16), textcoords="offset points", ha="center", color=colour)
+        scene.annotate(str(view), (view, 0), (0, -20), textcoords="offset points", ha="center", color=colour)
     scene.set(title="the scene from above", xlim=(-4.5, 9), ylim=(0, 10.8), xticks=[], ylabel="depth")
+    scene.set_xlabel("centres of images 0, 1, 2", labelpad=24)
     scene.set_yticks([10 / d for d in PLANES], [f"d = {d}" for d in PLANES])
     space.set(title="disparity space", xlabel="x, column in image 0", ylabel="disparity d", xlim=(-0.8, 16.8))
     space.set_yticks(list(PLANES), [f"d = {d}" for d in PLANES])

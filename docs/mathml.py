@@ -7,15 +7,22 @@ from typing import Any
 from latex2mathml.converter import convert
 
 _TEX = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
+_TAG = re.compile(r"\\tag\{(\w+)\}")
 
 
 def on_page_content(content: str, **_: Any) -> str:
-    """Replace what `pymdownx.arithmatex` has marked."""
+    """Replace what `pymdownx.arithmatex` has marked; equation n is the anchor ``#eq-n``."""
+    return _TEX.sub(_drawn, content)
 
-    def drawn(found: re.Match[str]) -> str:
-        tag, bracket, tex = found.groups()
-        block = bracket == "["
-        equation = convert(html.unescape(tex).strip(), display="block" if block else "inline")
+
+def _drawn(found: re.Match[str]) -> str:
+    tag, bracket, text = found.groups()
+    tex = html.unescape(text).strip()
+    if bracket == "(":
+        return str(convert(tex, display="inline"))
+    number = _TAG.search(tex)
+    equation = convert(_TAG.sub("", tex), display="block")
+    if number is None:
         return f'<{tag} class="equation">{equation}</{tag}>'
-
-    return _TEX.sub(drawn, content)
+    name = number.group(1)
+    return f'<{tag} class="equation" id="eq-{name}">{equation}<span>({name})</span></{tag}>'

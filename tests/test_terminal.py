@@ -57,7 +57,7 @@ def test_progress_names_what_runs_and_counts_what_is_left() -> None:
     progress("done", slow[0], Outcome("timeout", reason="took more than 30 s"))
     # five of 3 s and one of 33 s are waiting: two at once cannot be quicker than the longest
     assert progress.seconds_left() == pytest.approx(33)
-    assert "4/10 cells · 1 failed · about 33 s left" in shown(progress)
+    assert "4/10 cells · 1 failed · about 33 s left" in shown(progress, 70)
     for one in (*fast[1:], slow[1]):
         progress("start", one, None)
     assert len(progress._running) == 6
