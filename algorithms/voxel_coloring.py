@@ -26,8 +26,9 @@ class VoxelColoring:
     sigma(s)^2 = sum over w, colours, i in S of (I_i - mean over S of I_i)^2 / sum over w of 3 * (m(s, w) - 1)
 
     sigma(s) <= threshold. Window pixels seen by fewer than two views add nothing. All tests of a
-    plane come before its marks. Voxels lie at every sample of the finer rows (docs/concepts/disparity-space.md), so each
-    pixel of each view meets exactly one voxel of a plane and hides all those behind it.
+    plane come before its marks. Voxels lie at every sample of the finer rows
+    (docs/concepts/disparity-space.md), so each pixel of each view meets exactly one voxel of a plane
+    and hides all those behind it.
 
     Source: S. M. Seitz, C. R. Dyer, "Photorealistic scene reconstruction by voxel coloring",
     IJCV 35(2), 1999; pooling over a window is an addition, see docs/concepts/methods.md.

@@ -2,8 +2,9 @@
 
 Long commands are shortened by these rules, and by no others:
 
-- synthetic scenes are computed 64x48 pixels small, of `synthetic/*` only `synthetic/box`, and where no scene is named
-  it alone is taken;
+- synthetic scenes are computed 64x48 pixels small, and of `synthetic/*` only `synthetic/box`;
+- where no method is named `sgbm` is taken, not all of them;
+- the page of the report is drawn for the first comparison only; all write the tables;
 - on real scenes (`--data DIR`) everything happens up to the first cell, which takes minutes: the scenes are read and
   the plan is written. An ablation of real scenes is only asked which scenes it means and what varies in it;
 - `fetch` needs the network: it tells what it would fetch (`--dry-run`);
@@ -17,6 +18,7 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,8 +44,8 @@ def shortened(line: str) -> list[str]:
     tokens, out = shlex.split(line)[1:], []
     for before, token in pairwise(["", *tokens]):
         out += small(token) if before == "-s" or token.startswith("synthetic/") else [token]
-    if tokens[0] == "compare" and "-s" not in tokens:
-        out += ["-s", "synthetic/box[size=64x48]"]
+    if tokens[0] == "compare" and "-a" not in tokens:
+        out += ["-a", "sgbm"]
     return [*out, "--dry-run"] if tokens[0] == "fetch" else out
 
 
@@ -79,6 +81,14 @@ def test_commands_run_one_after_another(
 
     seen: list[Path] = []
     monkeypatch.setattr(recording, "view", lambda path, web: seen.append(path))
+    drawn: list[Path] = []
+    draw = comparison.Comparison.report
+
+    def report(ready: comparison.Comparison, *given: Any) -> Path:
+        drawn.append(ready.folder / "report.html")
+        return draw(ready, *given) if len(drawn) == 1 else drawn[-1]
+
+    monkeypatch.setattr(comparison.Comparison, "report", report)
     monkeypatch.chdir(desk)
     monkeypatch.delenv("MATBENCH_DATA", raising=False)
     for line in sorted(ELSEWHERE, key=lambda line: " view " in line):  # a guide shows each after its recording
@@ -88,7 +98,7 @@ def test_commands_run_one_after_another(
             (desk / "my_scene" / "scene.toml").write_text(SCENE)
         assert status == 0, f"{line}\n{said.out[-2000:]}{said.err}"
     assert len(seen) == sum(" view " in line for line in LINES)
-    assert all(path.is_file() for path in seen)
+    assert all(path.is_file() for path in (*seen, drawn[0]))
 
 
 def test_commands_on_real_scenes_are_ready_to_run(
