@@ -28,7 +28,7 @@ class AttrsClasses(Extension):
                 name.lstrip("_"), annotation=member.annotation, kind=ParameterKind.positional_or_keyword, default=value
             )
             for name, member in cls.members.items()
-            if isinstance(member, Attribute) and member.annotation and "ClassVar" not in str(member.annotation)
+            if isinstance(member, Attribute) and member.annotation and "instance-attribute" in member.labels
             for is_taken, value in [_default(member.value)]
             if is_taken
         ]
