@@ -129,10 +129,9 @@ def test_commands_on_real_scenes_are_ready_to_run(
             assert plans.pop().cells
 
 
-@pytest.mark.parametrize("line", INLINE)
+@pytest.mark.parametrize("line", [line for line in INLINE if "COMMAND" not in line])
 def test_commands_within_sentences_exist(line: str) -> None:
-    if line not in ("matbench COMMAND --help", "matbench list"):
-        app.parse_args(shlex.split(line)[1:], exit_on_error=False, print_error=False)
+    app.parse_args(shlex.split(line)[1:], exit_on_error=False, print_error=False)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=list(TEXT))
