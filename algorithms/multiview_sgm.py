@@ -1,4 +1,4 @@
-"""The control of SPEC 5 and 8: materiality's similarity, reader and mending, without materiality."""
+"""The control of materiality: its similarity, reader and mending, without materiality."""
 
 from attrs import frozen
 

@@ -16,7 +16,7 @@ BLOCK_ROWS = 32  # rows that one task works on: its arrays stay in the second-le
 
 @frozen
 class OkutomiKanade:
-    """For each pixel of the reference view the disparity that minimises the SSSD (SPEC 7).
+    """For each pixel of the reference view the disparity that minimises the SSSD.
 
     SSSD(x, d) = mean over views j != ref of
     sum over w in W of |I_ref(x + w) - I_j(x + w - (j - ref) * d)|^2, mean over the colours.

@@ -1,4 +1,7 @@
-"""Image rows sampled finer than a pixel, so that fine planes have whole-number homologues (SPEC 1)."""
+"""Image rows sampled finer than a pixel, so that fine planes have whole-number homologues.
+
+See docs/concepts/disparity-space.md.
+"""
 
 from math import ceil
 

@@ -21,16 +21,17 @@ class VoxelColoring:
 
     With S(s, w) the views that hold the pixel w beside the voxel s and have it still unmarked, and
     m(s, w) their number, the voxel is consistent if m(s, 0) >= 2 and the standard deviation pooled
-    over a window W and the three colours passes (SPEC 5 and 7):
+    over a window W and the three colours passes:
 
     sigma(s)^2 = sum over w, colours, i in S of (I_i - mean over S of I_i)^2 / sum over w of 3 * (m(s, w) - 1)
 
     sigma(s) <= threshold. Window pixels seen by fewer than two views add nothing. All tests of a
-    plane come before its marks. Voxels lie at every sample of the finer rows (SPEC 1), so each
-    pixel of each view meets exactly one voxel of a plane and hides all those behind it.
+    plane come before its marks. Voxels lie at every sample of the finer rows
+    (docs/concepts/disparity-space.md), so each pixel of each view meets exactly one voxel of a plane
+    and hides all those behind it.
 
     Source: S. M. Seitz, C. R. Dyer, "Photorealistic scene reconstruction by voxel coloring",
-    IJCV 35(2), 1999; pooling over a window is an addition, see SPEC 5.
+    IJCV 35(2), 1999; pooling over a window is an addition, see docs/concepts/methods.md.
 
     Parameters
     ----------

@@ -132,7 +132,7 @@ class Middlebury:
         called = f"middlebury{self.year}/{name}"
         for option in options:
             if option not in OPTIONS:
-                raise unknown(f"option of {called}", option, OPTIONS)
+                raise unknown(f"option of {called}", option, (*OPTIONS, "predict"))
         folder, size = self._locate(called, name, options.get("size"), root)
         layout, facts = self._layout(name, size), self.known.scenes.get(name, {}).get(size)
         labels = [layout.label.format(number) for number in layout.numbers]

@@ -132,7 +132,7 @@ class StoredScene:
         """
         for option in options:
             if option not in (*OPTIONS, *own):
-                raise unknown(f"option of {self.called}", option, (*OPTIONS, *own))
+                raise unknown(f"option of {self.called}", option, (*OPTIONS, *own, "predict"))
         chosen, ref = views_and_reference(self.called, self.labels, self._preferred(), options)
         searched = search_range(self.called, options.get("disparities"), self.pair_steps)
         partner = self._partner(ref)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from attrs import evolve, field, frozen
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
 from rich import console as rich_console
 
 from matbench import limits
@@ -58,6 +58,10 @@ app = App(
 `matbench view runs/1a2b3c4d`  open a recording
 
 `matbench scene check my_scene`  a scene of your own, a folder: is it what it says?
+
+**Exit status**
+
+0 all well, 1 cells failed, 2 wrong usage, 3 slower or worse than the baseline, 130 interrupted
 """,
     help_format="markdown",
     version=__version__,
@@ -113,7 +117,6 @@ class Options:
         str | None,
         Parameter(help="Dask scheduler that hands out the cells, tcp://HOST:PORT; or local: JOBS workers here."),
     ] = None
-
     only: Annotated[
         Only | None,
         Parameter(
@@ -123,6 +126,24 @@ class Options:
     ] = None
     repeats: Annotated[str, Parameter(help="Solve every cell so often: does a method repeat itself?")] = "1"
     dry_run: Annotated[bool, Parameter(negative="", help="Only say what would run, and why.")] = False
+    quiet: Annotated[
+        bool,
+        Parameter(
+            name=["--quiet", "-q"],
+            negative="",
+            show_default=False,
+            help="Print nothing but the run folder, and what failed as errors.",
+        ),
+    ] = False
+    as_json: Annotated[
+        bool,
+        Parameter(
+            name="--json",
+            negative="",
+            show_default=False,
+            help="Print one JSON document at the end: folder, cells, table; progress goes to the error stream.",
+        ),
+    ] = False
 
     @property
     def settings(self) -> Settings:
@@ -195,6 +216,10 @@ def compare(
     `matbench compare --jobs 4 --timeout 600 --memory 2G`
 
     `matbench compare --dask tcp://head:8786`
+
+    In a script, where the exit status tells 0 all well, 1 cells failed, 2 wrong usage, 130 interrupted:
+
+    `matbench compare -a sgbm -s synthetic/box --json`
     """
     from matbench import comparison
     from matbench.commands import running
@@ -203,7 +228,7 @@ def compare(
     if row is not None and not record:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
-        running.say_missing(comparison.default_scenes(options.data)[1], options.data)
+        running.say_missing(comparison.default_scenes(options.data)[1], options)
     ready = comparison.prepare(
         algorithm,
         scene,
@@ -219,7 +244,7 @@ def compare(
         repeats=_whole("repeats", options.repeats),
         write=not options.dry_run,
     )
-    return running.show_plan(ready) if options.dry_run else running.work(ready, options.metric)
+    return running.show_plan(ready) if options.dry_run else running.work(ready, options)
 
 
 @app.command(help_epilogue="")
@@ -273,7 +298,7 @@ def ablate(
     )
     if options.dry_run:
         return running.show_plan(ready)
-    return running.work(ready, options.metric, is_ablation=any(ablation.factors(chosen).values()))
+    return running.work(ready, options, is_ablation=any(ablation.factors(chosen).values()))
 
 
 def _whole(name: str, text: str) -> int:
@@ -370,6 +395,10 @@ def main(tokens: Sequence[str] | None = None) -> None:
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except UserError as error:
         status = _refuse(str(error))
+    except UnusedCliTokensError as error:
+        command = " ".join(("matbench", *(error.command_chain or ())))
+        extra = " ".join(error.unused_tokens or ())
+        status = _refuse(f"{extra!r} belongs to no option of {command}; {command} --help lists them")
     except CycloptsError as error:
         status = _refuse(" ".join(str(error).split()))
     except KeyboardInterrupt:

@@ -14,10 +14,18 @@ class UserError(Exception):
 def unknown(kind: str, value: str, possible: Iterable[str]) -> UserError:
     """The error for a name that does not exist: `kind` and `value`, the nearest name, all names.
 
+    Parameters
+    ----------
+    kind
+        What the name should be: a noun and, if need be, of what, such as ``option of synthetic/box``.
+
     >>> str(unknown("algorithm", "sgmb", ["sgbm", "okutomi_kanade"]))
     "unknown algorithm 'sgmb': did you mean 'sgbm'? Possible: okutomi_kanade, sgbm"
+    >>> str(unknown("preset of sgbm", "best", []))
+    "unknown preset 'best' of sgbm: Possible: none"
     """
     names = sorted(possible)
     near = get_close_matches(value, names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    return UserError(f"unknown {kind} {value!r}: {hint}Possible: {', '.join(names) or 'none'}")
+    noun, blank, of_what = kind.partition(" ")
+    return UserError(f"unknown {noun} {value!r}{blank}{of_what}: {hint}Possible: {', '.join(names) or 'none'}")

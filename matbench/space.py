@@ -1,4 +1,4 @@
-"""Disparity space: planes x rows x columns of target points (SPEC 1), and volumes over it."""
+"""Disparity space: planes x rows x columns of target points, and volumes over it (docs/concepts/disparity-space.md)."""
 
 from collections.abc import Mapping
 from math import ceil, floor
@@ -118,7 +118,7 @@ class Volume:
 
 
 def visibility(volume: Volume, view: int) -> NDArray[np.float32]:
-    """Visibility of every target point in one view (SPEC 1, equation 3).
+    """Visibility of every target point in one view (docs/concepts/materiality.md, equation 3).
 
     V(s) = Fr(s) * product of (1 - materiality) over the nearer points on its ray, in one sweep
     from near to far.

@@ -105,6 +105,8 @@ def terminal(sweeps: Sequence[Sweep], metric: str = METRIC) -> list[Table]:
     for sweep in sweeps:
         rows = lines(sweep, metric)
         rows = rows[rows["region"].isin(IN_TERMINAL)].drop(columns=["interval", "verdict"])
+        if rows.empty:
+            continue
         unit = metrics(sweep.curves).get(metric, "%")
         hint = "; too few scenes to conclude" if len(sweep.scenes) < FEW else ""
         head = f"{metric} ({unit}) against {title(sweep)}, mean over {_scenes(len(sweep.scenes))}{hint}"

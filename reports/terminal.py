@@ -28,6 +28,7 @@ from matbench.statistics import FEW
 WIDTH = 80
 NARROW = ("disc", "textureless")
 _PADDING = 2
+_NAMED = 3  # scenes named of those on which a method fails alike
 
 
 def tables(
@@ -147,10 +148,16 @@ def _scenes(
 
 
 def _bad(bad: pd.DataFrame) -> Table:
+    """Cells without a score; those of one method that share their reason in one row."""
     table = _plain(f"{len(bad)} cell{'s' if len(bad) != 1 else ''} without a score")
     for head in ("method", "scene", "seed", "status", "reason"):
         table.add_column(head, overflow="fold", justify="right" if head == "seed" else "left")
-    for _, row in bad.iterrows():
-        reason = "" if pd.isna(row["reason"]) else str(row["reason"])
-        table.add_row(*(Text(str(row[c])) for c in ("method", "scene", "seed", "status")), Text(reason))
+    for (method, status, reason), rows in bad.fillna({"reason": ""}).groupby(
+        ["method", "status", "reason"], sort=False
+    ):
+        scenes = list(dict.fromkeys(map(str, rows["scene"])))
+        more = [f"and {len(scenes) - _NAMED} more"] if len(scenes) > _NAMED else []
+        seeds = ", ".join(map(str, dict.fromkeys(rows["seed"])))
+        where = Text("\n".join([*scenes[:_NAMED], *more]))
+        table.add_row(Text(str(method)), where, seeds, str(status), Text(str(reason)))
     return table

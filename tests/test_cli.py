@@ -27,7 +27,7 @@ def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str
     ("tokens", "said"),
     [
         (["-a", "sgmb"], "unknown algorithm 'sgmb': did you mean 'sgbm'?"),
-        (["-a", "sgbm[fil=no]"], "unknown parameter of sgbm 'fil': did you mean 'fill'?"),
+        (["-a", "sgbm[fil=no]"], "unknown parameter 'fil' of sgbm: did you mean 'fill'?"),
         (["-a", "sgbm[fill=maybe]"], "sgbm: fill=maybe is not true or false"),
         (["-a", "sgbm["], "cannot read 'sgbm['"),
         (["-s", "middelbury2003/teddy"], "unknown dataset 'middelbury2003': did you mean 'middlebury2003'?"),
@@ -48,6 +48,8 @@ def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str
         (["-s", "synthetic/*[views=9]"], "no scene has the views asked for: synthetic/box[views=9]"),
         (["-s", "synthetic/box[disparities=9:1]"], "disparities=9:1 of synthetic/box: LEAST:LARGEST"),
         (["--bogus"], "Unknown option"),
+        (["stray"], "'stray' belongs to no option of matbench compare"),
+        (["-s", "synthetic/box[predct=left]"], "unknown option 'predct' of synthetic/box: did you mean 'predict'?"),
     ],
 )
 def test_wrong_usage_is_one_line_and_status_2(

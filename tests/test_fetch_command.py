@@ -155,7 +155,7 @@ def test_a_dry_run_asks_nobody_and_writes_nothing(person: Person, site) -> None:
     ("tokens", "said"),
     [
         (["toys/bx"], "unknown scene 'toys/bx': did you mean 'toys/box'? Possible: toys/ball, toys/box"),
-        (["toys/box[views=1]"], "unknown option of fetch in 'toys/box[views=1]' 'views'"),
+        (["toys/box[views=1]"], "unknown option 'views' of fetch in 'toys/box[views=1]'"),
         (["toys/box", "--mirror", "ftp://x/"], "mirror 'ftp://x/' is no address"),
         (["toys/box", "--data", "toys.json"], "toys.json' is a file"),
         (["toys/box", "--timeout", "0"], "timeout 0 is not between"),

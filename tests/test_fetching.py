@@ -375,7 +375,7 @@ def test_selectors(selectors, names: list[str], left_out: list[str]) -> None:
         ("middlebury2006/Aloe[size=full]", "size full is not known, known: third, half"),
         ("middlebury2001/*[size=half]", "size half is not known"),
         ("middlebury2005/Drumsticks", "none of its files is known"),
-        ("middlebury2006/Aloe[views=0:3]", "unknown option of fetch"),
+        ("middlebury2006/Aloe[views=0:3]", "unknown option 'views' of fetch"),
         ("synthetic/box", "the scenes of synthetic are not downloaded"),
         ("teddy", "scene 'teddy' has no dataset"),
         ("middlebury2006/[", "cannot read"),

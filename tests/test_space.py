@@ -1,4 +1,4 @@
-"""The geometry of disparity space (SPEC 1), against point-by-point definitions."""
+"""The geometry of disparity space (docs/concepts/disparity-space.md), against point-by-point definitions."""
 
 import numpy as np
 from hypothesis import given, settings

@@ -99,7 +99,7 @@ def test_a_preset_is_a_start_that_options_override() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"windw": "3"}, "unknown parameter of sample 'windw': did you mean 'window'?"),
+        ({"windw": "3"}, "unknown parameter 'windw' of sample: did you mean 'window'?"),
         ({"window": "three"}, "sample: window=three is not a whole number"),
         ({"window": "2.5"}, "sample: window=2.5 is not a whole number"),
         ({"window": 2.5}, "sample: window=2.5 is not a whole number"),
@@ -108,7 +108,7 @@ def test_a_preset_is_a_start_that_options_override() -> None:
         ({"sigma": "wide"}, "sample: sigma=wide is not a number"),
         ({"sigma": "inf"}, "sample: sigma=inf is not a number"),
         ({"sigma": float("nan")}, "sample: sigma=nan is not a number"),
-        ({"preset": "best"}, "unknown preset of sample 'best'"),
+        ({"preset": "best"}, "unknown preset 'best' of sample"),
         ({"window": "0"}, "sample: 'window' must be >= 1: 0"),
     ],
 )

@@ -1,4 +1,7 @@
-"""The materiality map (ICIP 2014): where the surfaces of a scene are, as a fuzzy map over disparity space."""
+"""The materiality map (ICIP 2014): where the surfaces of a scene are, as a fuzzy map over disparity space.
+
+Equations are numbered as in docs/concepts/materiality.md.
+"""
 
 from matbench.algorithms.materiality.method import Materiality
 

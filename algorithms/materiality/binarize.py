@@ -26,7 +26,7 @@ def _seen_rays(mu, view, first, origin, fineness, top, end, seen):  # type: igno
 
 
 def seen_rays(mu: NDArray[np.float32], space: DisparitySpace, view: int, threads: int = 1) -> NDArray[np.float32]:
-    """(H, W, planes) mu V_view on the pixel rays of a view: where each ray ends; sums to at most 1 (SPEC 3)."""
+    """(H, W, planes) mu V_view on the pixel rays of a view: where each ray ends; sums to at most 1."""
     seen = np.empty((space.rows, space.width, space.planes), np.float32)
     over_rows(
         lambda top, end: _seen_rays(mu, view, space.first, space.origin, space.fineness, top, end, seen),

@@ -1,4 +1,4 @@
-"""The materialities on which the maps of all views agree (SPEC 8)."""
+"""The materialities on which the maps of all views agree (equations 13 and 14)."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""How strongly adjacent target points are tied: less where the images have an edge between them (SPEC 4)."""
+"""How strongly adjacent target points are tied: less where the images have an edge between them (equation 8)."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -30,21 +30,22 @@ Binarization = Literal["plane", "ray", "volume"]
 
 @frozen
 class Materiality(Matching, Readings):
-    """The materiality map (paper; SPEC 1-4): a fuzzy map mu of surface points over disparity space.
+    """The materiality map (ICIP 2014): a fuzzy map mu of surface points over disparity space.
 
     It minimises E = E_data + E_smooth (5) over mu in [0, 1], with
 
     - visibility V_i(s) = Fr_i(s) * product of (1 - mu(t)) over the nearer points t on the ray (3),
     - E_data = sum over s and pairs (i, j) of (rho_ij(s) - mu(s) V_i(s) V_j(s))^2 (6),
-    - E_smooth = count / N (sum mu - N)^2 (7) + across sum w (mu(y + 1) - mu(y))^2
-      + along sum w (mu(x + 1) - mu(x))^2 (SPEC 4), edge weights w = exp(-|dI| / edge),
+    - E_smooth = count / N (sum mu - N)^2 (7) + across sum w (mu(y + 1) - mu(y))^2 +
+      along sum w (mu(x + 1) - mu(x))^2 (8), edge weights w = exp(-|dI| / edge),
 
-    by projected gradient with the exact derivative of SPEC 2, and reads the map in the reference view.
-    The default solver is a fixed point instead (SPEC 8): the maps of all views say how far their rays
+    by projected gradient with the exact derivative (9), and reads the map in the reference view.
+    The default solver is a fixed point instead (13-15): the maps of all views say how far their rays
     reach, so V and mu follow; with these all views are read again, as far as other views see each point.
     A pass lowers the reader's energy (`SemiGlobal.energy`) under the costs of that pass: ``energy_before``
     and ``energy`` in the history, with the share of pixels that ``changed``. As the reader only comes near
     the least, a pass after the first may end up to 2 % above where it began.
+    Numbers are those of the equations in docs/concepts/materiality.md.
     Parameters of similarity and reader are those of `Matching` and `Readings`; those of the energy
     (`count` to `edge`) say nothing at the fixed point, but for `target` where planes are binarised alone.
 

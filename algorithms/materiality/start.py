@@ -1,4 +1,4 @@
-"""Where the descent starts (SPEC 3): from the mean similarity, or softly."""
+"""Where the descent starts: from the mean similarity, or softly (equation 12)."""
 
 import numpy as np
 from numpy.typing import NDArray

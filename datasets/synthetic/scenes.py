@@ -73,7 +73,7 @@ class _Request:
         called, world = f"synthetic/{name}", WORLDS[name]
         for option in options:
             if option not in OPTIONS:
-                raise unknown(f"option of {called}", option, OPTIONS)
+                raise unknown(f"option of {called}", option, (*OPTIONS, "predict"))
         n = _number(called, options, "n", _VIEWS, 2, 25)
         seed = _number(called, options, "seed", 0, 0, 2**31 - 1)
         width, height = _read_size(called, options.get("size", f"{_WIDTH}x{_HEIGHT}"))

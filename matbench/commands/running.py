@@ -1,16 +1,20 @@
 """What `compare` and `ablate` share: a comparison run with progress shown, its tables printed, its report written."""
 
+import json
+import math
 import shlex
 import signal
+import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from attrs import frozen
 
 from matbench import scoring
-from matbench.cli import DONE, FAILED, INTERRUPTED, Console
+from matbench.cli import DONE, FAILED, INTERRUPTED, Console, Options
+from matbench.commands.progress import Progress
 from matbench.comparison import Comparison
 from matbench.limits import crowded
 from matbench.lock import locked
@@ -18,31 +22,65 @@ from matbench.repeats import unsteady
 from matbench.reports import curves, tables
 from matbench.reports import switches as effects
 from matbench.scenes import DATA_VARIABLE, data_root
-from matbench.store import FolderLost
+from matbench.store import FINAL, FolderLost
 from matbench.todo import explained, pending
 
 
-def work(ready: Comparison, metric: str, is_ablation: bool = False) -> int:
+@frozen
+class Voice:
+    """Who is spoken to, and how.
+
+    A person gets progress and tables. With ``--quiet`` only the run folder is printed, and what failed to the
+    error stream. With ``--json`` one document is printed at the end, and progress goes to the error stream.
+
+    Parameters
+    ----------
+    talk
+        For progress and remarks, line by line; None for none.
+    quiet, as_json
+        The options.
+    """
+
+    talk: Console | None
+    quiet: bool
+    as_json: bool
+
+    @classmethod
+    def of(cls, options: Options) -> "Voice":
+        talk = None if options.quiet else Console(stderr=options.as_json)
+        return cls(talk, options.quiet, options.as_json)
+
+    def say(self, line: str) -> None:
+        """Print a remark, if anybody listens."""
+        if self.talk is not None:
+            self.talk.say(line)
+
+    def busy(self, what: str) -> AbstractContextManager[object]:
+        """Show a terminal what takes a while."""
+        return nullcontext() if self.talk is None or not self.talk.is_terminal else self.talk.status(what)
+
+
+def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
     """Run, print and report a comparison; the exit status."""
-    console = Console()
+    voice = Voice.of(options)
     for reason, scenes in ready.left_out.items():
-        console.say(f"without {', '.join(scenes)}: {reason}")
+        voice.say(f"without {', '.join(scenes)}: {reason}")
     if ready.settings.dask is None and (crowd := crowded(ready.settings.jobs, ready.settings.threads_each())):
-        console.say(crowd)
+        voice.say(crowd)
     with locked(ready.folder):
         try:
-            stopped = _run(ready, console)
-            cells = publish(ready, metric, is_ablation, console)
+            stopped = _run(ready, voice)
+            cells = publish(ready, options.metric, is_ablation, voice, stopped)
         except FolderLost as error:
-            console.say(f"stopped: {error}")
+            print(f"matbench: stopped: {error}", file=sys.stderr)
             return FAILED
         except OSError as error:  # the tables are what does not fit any more
-            console.say(f"stopped: {FolderLost.of(ready.folder, error)}")
+            print(f"matbench: stopped: {FolderLost.of(ready.folder, error)}", file=sys.stderr)
             return FAILED
     if stopped:
-        console.say("interrupted: the same command goes on from here")
+        voice.say("interrupted: the same command goes on from here")
         return INTERRUPTED
-    return DONE if cells["status"].isin(["ok", "skipped"]).all() else FAILED
+    return DONE if cells["status"].isin(FINAL).all() else FAILED
 
 
 def show_plan(ready: Comparison) -> int:
@@ -60,86 +98,154 @@ def show_plan(ready: Comparison) -> int:
     return DONE
 
 
-def publish(ready: Comparison, metric: str, is_ablation: bool, console: Console, say_paths: bool = True) -> Any:
+def publish(
+    ready: Comparison, metric: str, is_ablation: bool, voice: Voice, stopped: bool = False, say_paths: bool = True
+) -> Any:
     """Score, write and print tables and report; the table of cells."""
-    results, cells = ready.tables()
-    sweeps = ready.sweeps(results)
-    switches = ready.ablation(results) if is_ablation else None
-    report = ready.report(results, cells, switches, sweeps)
-    _print_tables(results, cells, switches, sweeps, metric, console)
-    for line in unsteady(ready.plan, ready.store):
-        console.say(f"does not repeat itself: {line}")
-    if not say_paths:
-        return cells
+    with voice.busy("scoring"):
+        results, cells = ready.tables()
+        sweeps = ready.sweeps(results)
+        switches = ready.ablation(results) if is_ablation else None
+    with voice.busy("drawing the report"):
+        report = ready.report(results, cells, switches, sweeps)
     written = {"scores": ready.folder / "results.csv", "report": report}
     if sweeps:
         written["curves"] = ready.folder / "sweeps.csv"
     if is_ablation:
         written["ablation"] = ready.folder / "ablation.csv"
-    for what, path in written.items():
-        console.say(f"{what}: {path}")
-    if any(ready.folder.glob("cells/*/recording.rrd")):
-        console.say(f"recordings: matbench view {ready.folder}")
-    if stale := len(ready.store.stale(ready.plan)):
-        console.say(
-            f"{stale} stored cells are of other code or pixels: matbench status {ready.folder} --prune removes them"
-        )
+    metric = _measured(results, metric, voice)
+    if voice.as_json:
+        print(json.dumps(document(ready, results, cells, metric, written, stopped), indent=1, allow_nan=False))
+    elif voice.talk is None:
+        _say_failed(cells)
+        print(ready.folder)
+    else:
+        _print_tables(results, cells, switches, sweeps, metric, voice.talk)
+        for line in unsteady(ready.plan, ready.store):
+            voice.say(f"does not repeat itself: {line}")
+        if say_paths:
+            _say_paths(ready, written, voice)
     return cells
 
 
-def say_missing(missing: Sequence[str], data: Path | None) -> None:
+def _say_paths(ready: Comparison, written: dict[str, Path], voice: Voice) -> None:
+    for what, path in written.items():
+        voice.say(f"{what}: {path}")
+    if any(ready.folder.glob("cells/*/recording.rrd")):
+        voice.say(f"recordings: matbench view {ready.folder}")
+    if stale := len(ready.store.stale(ready.plan)):
+        voice.say(
+            f"{stale} stored cells are of other code or pixels: matbench status {ready.folder} --prune removes them"
+        )
+
+
+def document(
+    ready: Comparison, results: Any, cells: Any, metric: str, written: dict[str, Path], stopped: bool
+) -> dict[str, Any]:
+    """What `--json` prints: where the run is, what became of its cells, and the rows of the printed summary.
+
+    Keys: ``folder``; ``files``, what was written; ``interrupted``; ``cells``, status -> how many; ``unscored``,
+    each cell without a score with its reason; ``left_out``, why -> scenes; ``metric``; ``table``, the methods, best
+    first, with their means over the scenes they share in ``regions``, ``avg`` (pixels of the pair, in `all`) and
+    ``seconds``; null where there is no number.
+    """
+    regions = tables.summarised(results)
+    rows = [
+        {
+            "method": str(method),
+            "ranked": bool(row["ranked"]),
+            "scenes": int(row["scenes"]),
+            "asked": int(row["asked"]),
+            "regions": {region: _number(row[f"{metric} {region}"]) for region in regions},
+            "avg": _number(row["avg all"]),
+            "seconds": _number(row["seconds"]),
+        }
+        for method, row in tables.summary(results, cells, metric, _higher(metric)).iterrows()
+    ]
+    bad = tables.labelled(cells)
+    bad = bad[bad["status"] != "ok"]
+    columns = ["method", "scene", "seed", "status", "reason"]
+    return {
+        "folder": str(ready.folder),
+        "files": {what: str(path) for what, path in written.items()},
+        "interrupted": stopped,
+        "cells": {str(status): int(count) for status, count in cells["status"].value_counts().items()},
+        "unscored": [dict(zip(columns, map(_plain, row), strict=True)) for row in bad[columns].to_numpy().tolist()],
+        "left_out": {reason: list(scenes) for reason, scenes in ready.left_out.items()},
+        "metric": {"name": metric, "unit": tables.metrics(results).get(metric, ""), "better": _better(metric)},
+        "table": rows,
+    }
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _plain(value: Any) -> Any:
+    return "" if isinstance(value, float) and math.isnan(value) else value
+
+
+def _better(metric: str) -> str:
+    return next(m.better for m in scoring.metrics() if m.name == metric)
+
+
+def _higher(metric: str) -> bool:
+    return _better(metric) == "higher"
+
+
+def _say_failed(cells: Any) -> None:
+    bad = tables.labelled(cells)
+    for _, row in bad[~bad["status"].isin(FINAL)].iterrows():
+        print(f"matbench: {row['status']}: {row['method']} on {row['scene']}: {_plain(row['reason'])}", file=sys.stderr)
+
+
+def say_missing(missing: Sequence[str], options: Options) -> None:
+    """Say which of the default scenes are not there, and how they can be had."""
     if missing:
+        data = options.data
         root = data_root(data)
         why = f"not under {root}" if root else f"give the folder of real scenes by --data or {DATA_VARIABLE}, or"
         place = f" --data {shlex.quote(str(data))}" if data else ""
-        print(f"without {', '.join(missing)}: {why}{':' if root else ''} bring them with matbench fetch paper{place}")
+        Voice.of(options).say(
+            f"without {', '.join(missing)}: {why}{':' if root else ''} bring them with matbench fetch paper{place}"
+        )
 
 
-def _run(ready: Comparison, console: Console) -> bool:
+def _run(ready: Comparison, voice: Voice) -> bool:
     """Run a comparison with progress shown; True if it was interrupted."""
-    todo = len(pending(ready.plan, ready.store, ready.settings))
+    todo = pending(ready.plan, ready.store, ready.settings)
     total = len(ready.plan.cells)
-    if todo < total:
+    if len(todo) < total:
         what = "are done already" if ready.settings.only is None else "stay as they are"
-        console.say(f"{total - todo} of {total} cells {what} in {ready.folder}")
-    columns = (BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("starting", total=total, completed=total - todo)
-
-        def listen(event: str, cell: Any, outcome: Any) -> None:
-            if event == "start":
-                progress.update(task, description=escape(str(cell)))
-                return
-            progress.advance(task)
-            took = f" {outcome.seconds:.2f} s" if outcome.seconds is not None else ""
-            took += f" {outcome.reason}" if outcome.reason else ""
-            if not console.is_terminal or outcome.reason:
-                line = f"{outcome.status:>7}  {cell}{took}"
-                console.say(line)
-
-        # told to end, it ends its processes as if Ctrl-C had been typed
-        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-        try:
-            ready.run(listen)
-        except KeyboardInterrupt:
-            return True
-        finally:
-            signal.signal(signal.SIGTERM, before)
+        voice.say(f"{total - len(todo)} of {total} cells {what} in {ready.folder}")
+    # told to end, it ends its processes as if Ctrl-C had been typed
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with Progress(voice.talk, todo, done=total - len(todo)) as progress:
+            ready.run(progress)
+    except KeyboardInterrupt:
+        return True
+    finally:
+        signal.signal(signal.SIGTERM, before)
     return False
 
 
-def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
+def _measured(results: Any, metric: str, voice: Voice) -> str:
+    """The metric to show: the one asked for, else, as of scenes without truth, one that was measured."""
     measured = list(dict.fromkeys(results["metric"]))
-    if measured and metric not in measured:
-        shown = "prediction_psnr" if "prediction_psnr" in measured else measured[0]
-        if metric != tables.METRIC:  # scenes without truth have predictions only
-            console.say(
-                f"{metric} was not measured, shown is {shown}: predictions need [predict=left] or [predict=right] "
-                "after the scene, and metrics of volumes a method that has one"
-            )
-        metric = shown
-    higher = next(m.better for m in scoring.metrics() if m.name == metric) == "higher"
-    for table in tables.terminal(results, cells, metric, higher, console.width):
+    if not measured or metric in measured:
+        return metric
+    shown = "prediction_psnr" if "prediction_psnr" in measured else str(measured[0])
+    if metric != tables.METRIC:  # scenes without truth have predictions only
+        voice.say(
+            f"{metric} was not measured, shown is {shown}: predictions need [predict=left] or [predict=right] "
+            "after the scene, and metrics of volumes a method that has one"
+        )
+    return shown
+
+
+def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
+    for table in tables.terminal(results, cells, metric, _higher(metric), console.width):
         console.print(table)
     for table in curves.terminal(sweeps, metric):
         console.print(table)

@@ -101,7 +101,8 @@ def _score(folder: Path, data: Path | None, partial: bool, metric: str, console:
         console.say(f"without {name}: {why}")
     before = _read(folder / "results.csv")
     with locked(folder):
-        running.publish(ready, metric, (folder / "ablation.csv").exists(), console, say_paths=claimed is None)
+        voice = running.Voice(console, quiet=False, as_json=False)
+        running.publish(ready, metric, (folder / "ablation.csv").exists(), voice, say_paths=claimed is None)
     changed = _changes(before, _read(folder / "results.csv"))
     if before is None:
         return DONE

@@ -29,7 +29,7 @@ PAIR_SETS = st.sampled_from(["all", "consecutive", "reference"])
 
 
 def ray_walk(mu, space, view):
-    """(planes, columns) visibility of one row, walking from every point towards the camera (SPEC 1, 2-4)."""
+    """(planes, columns) visibility of one row, walking from every point towards the camera (equations 2-4)."""
     seen = np.zeros(mu.shape)
     for k, c in np.ndindex(mu.shape):
         sample = c - space.start(view, k)

@@ -93,7 +93,7 @@ def test_show_writes_a_sheet_and_a_recording(capsys: pytest.CaptureFixture[str],
     ("tokens", "said"),
     [
         (["show"], "no scene"),
-        (["show", "synthetic/bx"], "unknown scene of synthetic 'bx'"),
+        (["show", "synthetic/bx"], "unknown scene 'bx' of synthetic"),
         (["show", "synthetic/box", "synthetic/weak", "-o", "x.png"], "one file for 2 scenes"),
         (["show", "synthetic/box", "-o", "x.jpg"], "must end in .png"),
         (["show", "synthetic/box", "-o", "no/x.png"], "folder 'no' of --out does not exist"),

@@ -159,7 +159,7 @@ def test_listed_and_selected(root: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("hci/boxs", ["unknown scene of hci 'boxs'", "'boxes'"]),
+        ("hci/boxs", ["unknown scene 'boxs' of hci", "'boxes'"]),
         ("hci/dino", ["hci/dino is not in", "training"]),
         ("hci/../boxes", ["unknown scene"]),
         ("hci/boxes[row=9]", ["row=9", "0 (top) to 8"]),
@@ -168,7 +168,7 @@ def test_listed_and_selected(root: Path) -> None:
         ("hci/boxes[row=1 column=1]", ["cannot both"]),
         (
             "hci/boxes[size=half]",
-            ["unknown option of hci/boxes 'size'", "baseline, column, disparities, ref, row, views"],
+            ["unknown option 'size' of hci/boxes", "baseline, column, disparities, predict, ref, row, views"],
         ),
         ("hci/boxes[row=2 views=8:9]", ["at least two"]),
     ],

@@ -1,0 +1,138 @@
+"""What is shown while cells are computed: which run now, how many are done and failed, how long it may take yet."""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from types import TracebackType
+
+from attrs import define, field
+from rich.console import Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from matbench.cli import Console
+from matbench.plan import Cell
+from matbench.store import FINAL, Outcome
+
+SHOWN = 8  # cells that run at once and are named
+_BAR = 24
+
+
+@define(eq=False)
+class Progress:
+    """Told as cells start and end, shows a terminal what goes on, and whoever else reads a line for each that ended.
+
+    Parameters
+    ----------
+    console
+        Where it is shown; None for nowhere.
+    todo
+        The cells that will be computed.
+    done
+        How many of the plan are done already.
+    clock
+        Seconds that only grow.
+    """
+
+    console: Console | None
+    todo: Sequence[Cell]
+    done: int = 0
+    clock: Callable[[], float] = time.monotonic
+    failed: int = 0
+    _running: dict[str, tuple[Cell, float]] = field(factory=dict)  # key -> cell, and when it started
+    _waiting: dict[str, Cell] = field(init=False)
+    _took: dict[str, list[float]] = field(factory=dict)
+    _at_once: int = 1
+    _live: Live | None = None
+
+    def __attrs_post_init__(self) -> None:
+        self._waiting = {cell.key: cell for cell in self.todo}
+
+    def __enter__(self) -> "Progress":
+        if self.console is not None and self.console.is_terminal and self.todo:
+            self._live = Live(console=self.console, get_renderable=self._shown, refresh_per_second=4, transient=True)
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def __call__(self, event: str, cell: Cell, outcome: Outcome | None) -> None:
+        """Hear of a cell; several may start before one ends."""
+        if event == "start":
+            self._waiting.pop(cell.key, None)
+            self._running[cell.key] = (cell, self.clock())
+            self._at_once = max(self._at_once, len(self._running))
+        elif outcome is not None:
+            self._waiting.pop(cell.key, None)
+            if cell.key in self._running:
+                _, began = self._running.pop(cell.key)
+                self._took.setdefault(cell.method.algorithm, []).append(self.clock() - began)
+            self.done += 1
+            self.failed += outcome.status not in FINAL
+            self._say(cell, outcome)
+
+    def _say(self, cell: Cell, outcome: Outcome) -> None:
+        if self.console is None or (self._live is not None and not outcome.reason):
+            return  # whoever watches sees the counts; only what went wrong stays on the screen
+        took = f" {outcome.seconds:.2f} s" if outcome.seconds is not None else ""
+        reason = f" {outcome.reason}" if outcome.reason else ""
+        total = str(self.total)
+        self.console.say(f"{self.done:>{len(total)}}/{total} {outcome.status:>7}  {cell}{took}{reason}")
+
+    @property
+    def total(self) -> int:
+        return self.done + len(self._running) + len(self._waiting)
+
+    def seconds_left(self) -> float | None:
+        """About how long it will take yet, from what cells of the same method took; None before one has ended.
+
+        A method that has not ended anywhere is taken to need the mean of the others.
+        """
+        if not self._took:
+            return None
+        means = {name: sum(took) / len(took) for name, took in self._took.items()}
+        unknown, now = sum(means.values()) / len(means), self.clock()
+        expected = [means.get(cell.method.algorithm, unknown) for cell in self._waiting.values()]
+        for cell, began in self._running.values():
+            expected.append(max(0.0, means.get(cell.method.algorithm, unknown) - (now - began)))
+        return max(sum(expected) / self._at_once, max(expected, default=0.0))
+
+    def _shown(self) -> Group:
+        """A line of counts below a bar, and one for each cell that runs, cut at the terminal's edge."""
+        total = self.total
+        said = [f"{self.done}/{total} cells"]
+        if self.failed:
+            said.append(f"{self.failed} failed")
+        left = self.seconds_left()
+        if left is not None:
+            said.append(f"about {duration(left)} left")
+        head = Table.grid(padding=(0, 1))
+        head.add_row(ProgressBar(total=max(total, 1), completed=self.done, width=_BAR), _line(" · ".join(said)))
+        return Group(head, *_named(self._running.values(), self.clock()))
+
+
+def _named(running: Iterable[tuple[Cell, float]], now: float) -> list[Text]:
+    lines = [_line(f"  {duration(now - began):>6}  {cell}") for cell, began in running]
+    more = len(lines) - SHOWN
+    return [*lines[:SHOWN], _line(f"  and {more} more")] if more > 0 else lines
+
+
+def _line(text: str) -> Text:
+    return Text(text, no_wrap=True, overflow="ellipsis")
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them.
+
+    >>> duration(4.2), duration(75), duration(7500)
+    ('4 s', '1 min', '2 h 5 min')
+    """
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
