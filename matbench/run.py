@@ -23,7 +23,7 @@ Listener = Callable[[Event, Cell, Outcome | None], None]
 def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
     """The cells that still have to be computed: those without a final outcome, or without what was asked for besides.
 
-    That is a recording that shows the row asked for, and the volume of a method that has one.
+    That is a recording that holds what is asked for, and the volume of a method that has one.
     """
 
     def is_done(cell: Cell) -> bool:
@@ -32,9 +32,10 @@ def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
             return False
         if settings.volumes and outcome.has_volume and store.volume(cell) is None:
             return False
-        if not settings.record or outcome.status != "ok":
+        if settings.record is None or outcome.status != "ok":
             return True
-        return (store.cell(cell) / "recording.rrd").exists() and settings.row in (None, outcome.row)
+        has = outcome.recorded if (store.cell(cell) / "recording.rrd").exists() else None
+        return has is not None and has.covers(settings.record)
 
     return [cell for cell in plan.cells if not is_done(cell)]
 

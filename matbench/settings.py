@@ -6,6 +6,8 @@ from attrs import field, frozen
 
 from matbench import limits
 
+from matbench.recorded import Recording
+
 
 @frozen
 class Settings:
@@ -16,9 +18,7 @@ class Settings:
     data
         The folder of real scenes, if there is one.
     record
-        Write a recording of every cell, from a second, untimed solve.
-    row
-        The image row that recordings show; the middle one of each scene if None.
+        What to record of every cell, from a second, untimed solve; nothing if None.
     volumes
         Keep the volumes of the methods that have one.
     timeout
@@ -44,8 +44,7 @@ class Settings:
     """
 
     data: Path | None = None
-    record: bool = False
-    row: int | None = None
+    record: Recording | None = None
     volumes: bool = False
     timeout: float | None = field(default=limits.HOUR, converter=limits.seconds)
     memory: int | None = field(default=None, converter=limits.mebibytes)

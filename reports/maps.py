@@ -1,0 +1,130 @@
+"""The paper's figure 3: scenes, their true disparities, and the maps of methods."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from matbench import coloring
+from matbench.errors import UserError
+from matbench.reports.columns import INCHES, TALLEST, Drawn, Width, letter, look
+from matbench.reports.figures import printable
+from matbench.scene import Scene
+
+ABREAST: dict[Width, int] = {"column": 4, "page": 8}
+"""Scenes in one line."""
+
+
+@frozen(eq=False)
+class Maps:
+    """What the figure shows.
+
+    Parameters
+    ----------
+    scenes
+        Column by column.
+    methods
+        Row by row, after the reference view and the truth.
+    disparity
+        (method, scene's name) -> (H, W) map in pixels per view step; missing where there is none.
+    """
+
+    scenes: tuple[Scene, ...]
+    methods: tuple[str, ...]
+    disparity: Mapping[tuple[str, str], NDArray[np.float32]]
+
+
+def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
+    """Reference views, truths and maps, one scene a column; with `errors` also the errors of each map.
+
+    Raises
+    ------
+    UserError
+        If it were higher than a page.
+    """
+    from matplotlib.figure import Figure
+
+    inches = INCHES[width]
+    lines = [maps.scenes[i : i + ABREAST[width]] for i in range(0, len(maps.scenes), ABREAST[width])]
+    rows = _rows(maps, errors)
+    across = max(map(len, lines))
+    side = (inches - 0.18) / across
+    heights = [max(side * s.height / s.width for s in line) for line in lines]
+    tall = sum(len(rows) * (height + 0.03) + 0.24 for height in heights)
+    if tall > TALLEST:
+        raise UserError(
+            f"{len(maps.scenes)} scenes and {len(maps.methods)} methods are {tall:.0f} inches high, a page holds "
+            f"{TALLEST:g}: choose some by -s and -a, or take --width page"
+        )
+    with look():
+        figure = Figure(figsize=(inches, tall))
+        below = tall
+        for line, height in zip(lines, heights, strict=True):
+            below -= 0.2
+            for at, scene in enumerate(line):
+                for number, (kind, method, _) in enumerate(rows):
+                    bottom = below - (number + 1) * (height + 0.03)
+                    box = (0.16 + at * side + 0.01, bottom, side - 0.02, height)
+                    axis = figure.add_axes((box[0] / inches, box[1] / tall, box[2] / inches, box[3] / tall))
+                    _draw(axis, maps, scene, kind, method)
+                    if number == 0:
+                        _title(axis, printable(_short(scene.name), round(26 * side)))
+            for number in range(len(rows)):
+                middle = below - (number + 0.5) * (height + 0.03)
+                figure.text(0.08 / inches, middle / tall, f"({letter(number)})", ha="center", va="center", rotation=90)
+            below -= len(rows) * (height + 0.03) + 0.04
+    return Drawn(figure, _caption(maps, rows))
+
+
+def _rows(maps: Maps, errors: bool) -> list[tuple[str, str, str]]:
+    """(kind, method, what it is) of every row."""
+    rows = [("view", "", "reference views")]
+    if any(scene.ref in scene.truth for scene in maps.scenes):
+        rows.append(("truth", "", "true disparities, grey unknown"))
+    for method in maps.methods:
+        rows.append(("map", method, method))
+        if errors:
+            rows.append(
+                ("error", method, f"its errors, 0 (black) to {coloring.WORST:g} px of the pair and more (pale)")
+            )
+    return rows
+
+
+def _draw(axis: Any, maps: Maps, scene: Scene, kind: str, method: str) -> None:
+    axis.axis("off")
+    truth, ends = scene.truth.get(scene.ref), coloring.disparity_ends(scene)
+    if kind == "view":
+        axis.imshow(scene.views[scene.ref])
+    if kind == "truth" and truth is not None:
+        axis.imshow(coloring.truth_colors(truth, ends))
+    found = maps.disparity.get((method, scene.name))
+    if kind == "map" and found is not None:
+        axis.imshow(coloring.disparity_colors(found, ends))
+    if kind == "error" and found is not None and truth is not None:
+        axis.imshow(coloring.error_colors(found, truth, scene.pair_steps))
+    if not axis.images:
+        axis.text(0.5, 0.5, "none", ha="center", va="center", transform=axis.transAxes)
+
+
+def _title(axis: Any, name: str) -> None:
+    axis.set_title(name, parse_math=False)
+
+
+def _short(name: str) -> str:
+    return name.partition("/")[2] or name
+
+
+def _caption(maps: Maps, rows: Sequence[tuple[str, str, str]]) -> str:
+    letters = "; ".join(f"({letter(i)}) {what}" for i, (_, _, what) in enumerate(rows))
+    ends = []
+    for scene in maps.scenes:
+        low, high = coloring.disparity_ends(scene)
+        ends.append(f"{scene.name} (view {scene.labels[scene.ref]}, {low:.4g} to {high:.4g})")
+    missing = [f"{m} on {s.name}" for m in maps.methods for s in maps.scenes if (m, s.name) not in maps.disparity]
+    lacks = f" Without a map: {', '.join(missing)}." if missing else ""
+    return (
+        f"Disparity maps. Columns: {', '.join(ends)}, disparities in px per view step from dark blue to yellow, one "
+        f"scale for each scene; striped: no answer. Rows: {letters}.{lacks}"
+    )
