@@ -10,7 +10,7 @@ from matbench import drawing
 from matbench.algorithm import Probe
 from matbench.drawing import Reduced
 from matbench.recorded import Recording
-from matbench.space import DisparitySpace, Volume, visibility
+from matbench.space import Volume, visibility
 
 TOLD_VOLUMES = 12  # volumes that a method tells; later names are left out
 PASS_PIXELS = 200_000  # the map of a pass
@@ -54,13 +54,15 @@ class RecordingProbe(Probe):
     ----------
     wanted
         What is listened to, with its rows.
+    latest
+        The slices of the similarity told last.
     """
 
     wanted: Recording
     active: bool = True
     volumes: dict[str, Reduced] = field(factory=dict)
     similarities: dict[str, NDArray[np.uint8]] = field(factory=dict)
-    space: DisparitySpace | None = None
+    latest: Volume | None = None
     energies: dict[str, list[tuple[int, float]]] = field(factory=dict)
     _frames: list[Frame] = field(factory=list)
     _last: Frame | None = None
@@ -68,11 +70,11 @@ class RecordingProbe(Probe):
     _stride: int = 1
 
     def volume(self, name: str, volume: Volume) -> None:
-        self.space = volume.space
+        if self.wanted.slices and name.startswith("similarity/"):
+            self.latest = self.slices_of(volume)
+            self.similarities[name] = drawing.as_bytes(self.latest.values)
         if self.wanted.volumes and (name in self.volumes or len(self.volumes) < TOLD_VOLUMES):
             self.volumes[name] = drawing.reduced(volume, min(self.wanted.rows[0], volume.space.rows - 1))
-        if self.wanted.slices and name.startswith("similarity/"):
-            self.similarities[name] = drawing.as_bytes(self.slices_of(volume).values)
 
     def iteration(
         self,

@@ -12,6 +12,7 @@ from matbench.errors import UserError
 from matbench.reports.columns import INCHES, TALLEST, Drawn, Width, letter, look
 from matbench.reports.figures import printable
 from matbench.scene import Scene
+from matbench.spec import read_scene
 
 ABREAST: dict[Width, int] = {"column": 4, "page": 8}
 """Scenes in one line."""
@@ -48,7 +49,7 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
 
     inches = INCHES[width]
     lines = [maps.scenes[i : i + ABREAST[width]] for i in range(0, len(maps.scenes), ABREAST[width])]
-    rows = _rows(maps, errors)
+    rows, titles = _rows(maps, errors), _titles(maps.scenes)
     across = max(map(len, lines))
     side = (inches - 0.18) / across
     heights = [max(side * s.height / s.width for s in line) for line in lines]
@@ -69,8 +70,10 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
                     box = (0.16 + at * side + 0.01, bottom, side - 0.02, height)
                     axis = figure.add_axes((box[0] / inches, box[1] / tall, box[2] / inches, box[3] / tall))
                     _draw(axis, maps, scene, kind, method)
-                    if number == 0:
-                        _title(axis, printable(_short(scene.name), round(26 * side)))
+                name = printable(titles[scene.name], round(17 * side))
+                figure.text(
+                    (0.16 + (at + 0.5) * side) / inches, (below + 0.05) / tall, name, ha="center", parse_math=False
+                )
             for number in range(len(rows)):
                 middle = below - (number + 0.5) * (height + 0.03)
                 figure.text(0.08 / inches, middle / tall, f"({letter(number)})", ha="center", va="center", rotation=90)
@@ -94,6 +97,7 @@ def _rows(maps: Maps, errors: bool) -> list[tuple[str, str, str]]:
 
 def _draw(axis: Any, maps: Maps, scene: Scene, kind: str, method: str) -> None:
     axis.axis("off")
+    axis.set_anchor("N")
     truth, ends = scene.truth.get(scene.ref), coloring.disparity_ends(scene)
     if kind == "view":
         axis.imshow(scene.views[scene.ref])
@@ -108,12 +112,16 @@ def _draw(axis: Any, maps: Maps, scene: Scene, kind: str, method: str) -> None:
         axis.text(0.5, 0.5, "none", ha="center", va="center", transform=axis.transAxes)
 
 
-def _title(axis: Any, name: str) -> None:
-    axis.set_title(name, parse_math=False)
-
-
-def _short(name: str) -> str:
-    return name.partition("/")[2] or name
+def _titles(scenes: Sequence[Scene]) -> dict[str, str]:
+    """Scenes without dataset and options, where they can still be told apart; the caption has all of it."""
+    for shorten in (
+        lambda name: read_scene(name).name.partition("/")[2] or name,
+        lambda name: name.partition("/")[2] or name,
+    ):
+        short = {scene.name: str(shorten(scene.name)) for scene in scenes}
+        if len(set(short.values())) == len(short):
+            return short
+    return {scene.name: scene.name for scene in scenes}
 
 
 def _caption(maps: Maps, rows: Sequence[tuple[str, str, str]]) -> str:

@@ -47,17 +47,22 @@ class EpipolarPlane:
     ----------
     space
         Whose planes and columns they have.
-    step
-        View steps of the scene between neighbouring views of that space.
+    views
+        Which of the scene's views that space spans, evenly spaced.
     passes
         How many passes the method made, as far as it told.
     """
 
     row: int
     space: DisparitySpace
-    step: int
+    views: tuple[int, ...]
     slices: tuple[Slice, ...]
     passes: int
+
+    @property
+    def step(self) -> int:
+        """View steps of the scene between neighbouring views of the space."""
+        return self.views[1] - self.views[0]
 
 
 def epipolar_plane(scene: Scene, probe: RecordingProbe, estimate: Estimate) -> EpipolarPlane | None:
@@ -79,13 +84,13 @@ def epipolar_plane(scene: Scene, probe: RecordingProbe, estimate: Estimate) -> E
     if slopes is not None:
         meaning = "energy derivative according to materiality: red negative, blue positive, black zero"
         found.append(Slice("energy derivative", drawing.sign_colors(slopes[0]), meaning))
-    space = volume.space if volume is not None else probe.space
-    if not found or space is None:
+    where = volume or probe.latest
+    if not found or where is None:
         return None
+    space = where.space
     alike = tuple(s for s in found if s.picture.shape[:2] == space.shape[1:])
-    step = volume.views[1] - volume.views[0] if volume is not None else 1
     told = max((len(values) for values in probe.energies.values()), default=0)
-    return EpipolarPlane(row, space, step, alike, told)
+    return EpipolarPlane(row, space, where.views, alike, told)
 
 
 def _named(names: tuple[str, ...]) -> str:
@@ -109,15 +114,14 @@ def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column
     each = SLICE_HEIGHT * (inches / INCHES["column"]) ** 0.5
     with look():
         figure = Figure(figsize=(inches, top + count * (each + 0.14) + 0.3))
-        figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0.02, hspace=0.02)
+        figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.04, wspace=0.02, hspace=0.02)
         upper, lower = figure.subfigures(2, 1, height_ratios=[top, count * (each + 0.14) + 0.3], squeeze=False)[:, 0]
         panels = _top(upper, scene, plane.row, truth)
         axes = lower.subplots(count, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
         for number, (axis, one) in enumerate(zip(axes, plane.slices, strict=True), len(panels)):
             _draw_slice(axis, plane, one, f"({letter(number)}) {one.name}")
-        axes[-1].set_xlabel(f"column of view {scene.labels[0]} [px]")
-        middle = axes[len(axes) // 2]
-        middle.set_ylabel("disparity [px per view step]" if count > 2 else "disparity")
+        axes[-1].set_xlabel(f"column of view {scene.labels[plane.views[0]]} [px]")
+        lower.supylabel("disparity [px per view step]" if count > 2 else "disparity", fontsize="medium")
     panels += [one.meaning for one in plane.slices]
     letters = "; ".join(f"({letter(i)}) {panel}" for i, panel in enumerate(panels))
     first, last = (float(d) / plane.step for d in plane.space.disparities[[0, -1]])
@@ -125,7 +129,7 @@ def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column
     caption = (
         f"Slice through the disparity space of {scene.name}, epipolar plane of row {plane.row}, by {method}{passes}. "
         f"{letters}. Disparities {first:.4g} to {last:.4g} px per view step, the nearest on top; columns in px of "
-        f"view {scene.labels[0]}, beyond its frame too."
+        f"view {scene.labels[plane.views[0]]}, beyond its frame too."
     )
     return Drawn(figure, caption)
 
