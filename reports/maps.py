@@ -16,6 +16,8 @@ from matbench.spec import read_scene
 
 ABREAST: dict[Width, int] = {"column": 4, "page": 8}
 """Scenes in one line."""
+LEAST = 0.45
+"""Inches, of a picture's width: what can still be seen."""
 
 
 @frozen(eq=False)
@@ -43,7 +45,7 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
     Raises
     ------
     UserError
-        If it were higher than a page.
+        If a page cannot hold it.
     """
     from matplotlib.figure import Figure
 
@@ -51,14 +53,17 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
     lines = [maps.scenes[i : i + ABREAST[width]] for i in range(0, len(maps.scenes), ABREAST[width])]
     rows, titles = _rows(maps, errors), _titles(maps.scenes)
     across = max(map(len, lines))
-    side = (inches - 0.18) / across
-    heights = [max(side * s.height / s.width for s in line) for line in lines]
-    tall = sum(len(rows) * (height + 0.03) + 0.24 for height in heights)
-    if tall > TALLEST:
+    shapes = [max(s.height / s.width for s in line) for line in lines]
+    spare = TALLEST - sum(0.24 + 0.03 * len(rows) for _ in lines)
+    side = min((inches - 0.18) / across, inches / 2, spare / (len(rows) * sum(shapes)))
+    if side < LEAST:
         raise UserError(
-            f"{len(maps.scenes)} scenes and {len(maps.methods)} methods are {tall:.0f} inches high, a page holds "
-            f"{TALLEST:g}: choose some by -s and -a, or take --width page"
+            f"{len(maps.scenes)} scenes with {len(rows)} pictures each are more than a page holds: choose some by -s "
+            "and -a, or take --width page"
         )
+    heights = [side * shape for shape in shapes]
+    tall = sum(len(rows) * (height + 0.03) + 0.24 for height in heights)
+    margin = (inches - across * side) / 2 + 0.08
     with look():
         figure = Figure(figsize=(inches, tall))
         below = tall
@@ -67,16 +72,23 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
             for at, scene in enumerate(line):
                 for number, (kind, method, _) in enumerate(rows):
                     bottom = below - (number + 1) * (height + 0.03)
-                    box = (0.16 + at * side + 0.01, bottom, side - 0.02, height)
+                    box = (margin + at * side + 0.01, bottom, side - 0.02, height)
                     axis = figure.add_axes((box[0] / inches, box[1] / tall, box[2] / inches, box[3] / tall))
                     _draw(axis, maps, scene, kind, method)
                 name = printable(titles[scene.name], round(17 * side))
                 figure.text(
-                    (0.16 + (at + 0.5) * side) / inches, (below + 0.05) / tall, name, ha="center", parse_math=False
+                    (margin + (at + 0.5) * side) / inches, (below + 0.05) / tall, name, ha="center", parse_math=False
                 )
             for number in range(len(rows)):
                 middle = below - (number + 0.5) * (height + 0.03)
-                figure.text(0.08 / inches, middle / tall, f"({letter(number)})", ha="center", va="center", rotation=90)
+                figure.text(
+                    (margin - 0.08) / inches,
+                    middle / tall,
+                    f"({letter(number)})",
+                    ha="center",
+                    va="center",
+                    rotation=90,
+                )
             below -= len(rows) * (height + 0.03) + 0.04
     return Drawn(figure, _caption(maps, rows))
 

@@ -11,6 +11,7 @@ from attrs import evolve
 from matbench import coloring, comparison, drawing, load_scene
 from matbench.algorithm import Context
 from matbench.cli import main
+from matbench.errors import UserError
 from matbench.listening import RecordingProbe
 from matbench.recorded import Recording
 from matbench.reports import columns, maps, slices
@@ -127,8 +128,8 @@ def test_many_scenes_go_on_in_the_next_line_until_the_page_is_full() -> None:
     assert drawn.figure.get_figwidth() == 3.25
     assert "Without a map: m on made/0." in drawn.caption
     assert [text.get_text() for text in drawn.figure.texts].count("(c)") == 2
-    with pytest.raises(maps.UserError, match="a page holds 9"):
-        maps.draw(maps.Maps(scenes, tuple("abcdefghij"), {}), errors=True)
+    with pytest.raises(UserError, match="more than a page holds"):
+        maps.draw(maps.Maps(scenes, tuple("abcdefghijklmnop"), {}), errors=True)
 
 
 def test_hostile_names_are_only_letters(tmp_path: Path) -> None:
@@ -159,7 +160,7 @@ def test_hostile_names_are_only_letters(tmp_path: Path) -> None:
 )
 def test_wrong_usage_is_one_line(run: Path, capsys: pytest.CaptureFixture[str], tokens: list[str], said: str) -> None:
     before = sorted(run.iterdir())
-    status, _, err = matbench(capsys, "figure", *(str(run) if token == "RUN" else token for token in tokens))
+    status, _, err = matbench(capsys, "figure", *(str(run) if one == "RUN" else one for one in tokens))
     assert (status, err.count("\n")) == (2, 1)
     assert said in err
     assert sorted(run.iterdir()) == before
