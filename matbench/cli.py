@@ -56,6 +56,8 @@ app = App(
 
 `matbench view runs/1a2b3c4d`  open a recording
 
+`matbench report runs/1a2b3c4d --format tex`  the table for a paper; `figure` draws its figures
+
 `matbench scene check my_scene`  a scene of your own, a folder: is it what it says?
 """,
     help_format="markdown",
