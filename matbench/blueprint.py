@@ -120,10 +120,9 @@ def side_by_side(one: Contents, other: Contents) -> rrb.Blueprint:
         solids = _solids(contents, name)
         if solids:
             rows.append(rrb.Tabs(contents=solids, active_tab=0))
-        rows.append(rrb.Horizontal(contents=_answers(contents, name)))
-        tabs = _slices(contents, name)
-        if tabs:
-            rows.append(rrb.Tabs(contents=tabs, active_tab=0))
+        rows.append(rrb.Horizontal(contents=_answers(contents)))
+        about = rrb.TextDocumentView(origin=contents.at(("about",)), name="About")
+        rows.append(rrb.Tabs(contents=[*_slices(contents), about], active_tab=0))
         columns.append(rrb.Vertical(contents=rows))
     shared: list[Panel] = [_picture(one, one.reference, "Reference view")]
     if one.truth:
@@ -131,8 +130,6 @@ def side_by_side(one: Contents, other: Contents) -> rrb.Blueprint:
     curves = [curve for contents in (one, other) for curve in _curves(contents, f"{contents.method}: ")]
     if curves:
         shared.append(rrb.Tabs(contents=curves, active_tab=0))
-    abouts = [rrb.TextDocumentView(origin=c.at(("about",)), name=f"{c.method}: about") for c in (one, other)]
-    shared.append(rrb.Tabs(contents=abouts, active_tab=0))
     both = rrb.Vertical(rrb.Horizontal(contents=columns), rrb.Horizontal(contents=shared), row_shares=[4, 1])
     return _blueprint(both, _has_time(one) or _has_time(other))
 
@@ -176,14 +173,14 @@ def _curves(contents: Contents, name: str = "") -> list[Panel]:
     return panels
 
 
-def _answers(contents: Contents, name: str = "") -> list[Panel]:
+def _answers(contents: Contents) -> list[Panel]:
     """The answer and its error, or those of the pass that is looked at."""
     kinds = [("disparity", "Disparity")]
     if contents.truth:
         kinds.append(("error", "Error, px of the pair"))
     panels: list[Panel] = []
     for kind, what in kinds:
-        panel: Panel = _picture(contents, ("estimate", kind), f"{name}{what}")
+        panel: Panel = _picture(contents, ("estimate", kind), what)
         if contents.maps:
             passing = _picture(contents, ("passes", kind), f"{what.partition(',')[0]} of the pass")
             panel = rrb.Tabs(panel, passing, active_tab=0)
@@ -191,13 +188,13 @@ def _answers(contents: Contents, name: str = "") -> list[Panel]:
     return panels
 
 
-def _slices(contents: Contents, name: str = "") -> list[Panel]:
+def _slices(contents: Contents) -> list[Panel]:
     """One tab for each row: slices are wide, so at most two stand side by side."""
     tabs: list[Panel] = []
     for here in contents.slices:
         pictures = [_picture(contents, path, what.capitalize()) for what, path in here.paths.items()]
         columns = 2 if len(pictures) > 2 else 1
-        tabs.append(rrb.Grid(contents=pictures, grid_columns=columns, name=f"{name}Epipolar slices, row {here.row}"))
+        tabs.append(rrb.Grid(contents=pictures, grid_columns=columns, name=f"Epipolar slices, row {here.row}"))
     return tabs
 
 

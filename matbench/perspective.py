@@ -104,7 +104,7 @@ class Perspective:
             return None
         # from behind the reference view, so that the cameras are in sight; a step aside shows depth
         depth = float(np.median(points[:, 2]))
-        return from_the_side(np.array([0, 0, depth]), 1.6 * depth)
+        return from_the_side(np.array([0, 0, depth]), 1.3 * depth)
 
 
 def from_the_side(target: NDArray[np.floating], distance: float) -> Eye:

@@ -137,9 +137,16 @@ class Recorder:
         colors = [VIEW_COLORS[i % len(VIEW_COLORS)] if colored else FAINT for i in range(len(strips))]
         radii = RAY if colored else THIN
         self.log(*path, what=rr.LineStrips3D(strips, colors=colors, radii=radii))
-        starts = [strip[0] for strip in strips]
-        named = rr.Points3D(starts, colors=colors, radii=radii, labels=list(names), show_labels=not colored)
-        self.log(*path, "names", what=named)
+        # of planes the first and the last: more names would hide what they name
+        named = range(len(strips)) if colored else sorted({0, len(strips) - 1})
+        starts = rr.Points3D(
+            [strips[i][0] for i in named],
+            colors=[colors[i] for i in named],
+            radii=radii,
+            labels=[names[i] for i in named],
+            show_labels=not colored,
+        )
+        self.log(*path, "names", what=starts)
 
     def pixel(self, disparity: NDArray[np.float32]) -> tuple[int, int] | None:
         """The answered pixel of the first row shown that is nearest to its middle."""

@@ -126,14 +126,10 @@ def _draw(axis: Any, maps: Maps, scene: Scene, kind: str, method: str) -> None:
 
 def _titles(scenes: Sequence[Scene]) -> dict[str, str]:
     """Scenes without dataset and options, where they can still be told apart; the caption has all of it."""
-    for shorten in (
-        lambda name: read_scene(name).name.partition("/")[2] or name,
-        lambda name: name.partition("/")[2] or name,
-    ):
-        short = {scene.name: str(shorten(scene.name)) for scene in scenes}
-        if len(set(short.values())) == len(short):
-            return short
-    return {scene.name: scene.name for scene in scenes}
+    whole = {scene.name: scene.name for scene in scenes}
+    tails = {name: name.partition("/")[2] or name for name in whole}
+    bare = {name: read_scene(name).name.partition("/")[2] or name for name in whole}
+    return next(short for short in (bare, tails, whole) if len(set(short.values())) == len(whole))
 
 
 def _caption(maps: Maps, rows: Sequence[tuple[str, str, str]]) -> str:
