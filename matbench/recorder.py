@@ -33,7 +33,7 @@ RAY = rr.Radius.ui_points(1.5)
 # Okabe and Ito's colours: apart for every kind of eye
 VIEW_COLORS = ((230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66), (0, 114, 178), (213, 94, 0))
 
-contents_converter = make_converter()
+_converter = make_converter()
 
 
 @define(eq=False)
@@ -286,7 +286,7 @@ def _disparities(values: list[float]) -> list[str]:
 
 def contents_text(contents: Contents) -> str:
     """What a recording notes of itself, as JSON."""
-    text: str = contents_converter.dumps(contents)
+    text: str = _converter.dumps(contents)
     return text
 
 
@@ -298,5 +298,5 @@ def read_contents(text: str) -> Contents:
     Exception
         Whatever `cattrs` or `json` raise where it is something else.
     """
-    contents: Contents = contents_converter.loads(text, Contents)
+    contents: Contents = _converter.loads(text, Contents)
     return contents
