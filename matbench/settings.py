@@ -5,7 +5,6 @@ from pathlib import Path
 from attrs import field, frozen
 
 from matbench import limits
-
 from matbench.recorded import Recording
 
 

@@ -74,10 +74,10 @@ def slice_(
     """
     from matbench import plugins, spec
     from matbench.algorithm import Context
+    from matbench.limits import cores
     from matbench.listening import RecordingProbe
     from matbench.recorded import Recording
     from matbench.reports import slices
-    from matbench.run import threads
     from matbench.store import Store
     from matbench.worker import checked, hide_truth
 
@@ -105,7 +105,7 @@ def slice_(
     probe = RecordingProbe(wanted.at(scene.height))
     with console.status(f"{chosen}: solving once more"):
         hidden = hide_truth(scene)
-        estimate = method.solve(hidden, Context(chosen.seed, threads(), probe))
+        estimate = method.solve(hidden, Context(chosen.seed, cores(), probe))
         answer = checked(estimate, hidden)
     plane = slices.epipolar_plane(scene, probe, estimate)
     if plane is None:
