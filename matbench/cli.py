@@ -15,6 +15,7 @@ from rich import console as rich_console
 from matbench import limits
 from matbench._version import __version__
 from matbench.errors import UserError
+from matbench.recorded import Recording
 from matbench.settings import Only, Settings
 
 
@@ -56,6 +57,8 @@ app = App(
 `matbench fetch paper`  download the paper's three scenes
 
 `matbench view runs/1a2b3c4d`  open a recording
+
+`matbench report runs/1a2b3c4d --format tex`  the table for a paper; `figure` draws its figures
 
 `matbench scene check my_scene`  a scene of your own, a folder: is it what it says?
 
@@ -180,8 +183,19 @@ def compare(
             "-s", "--scene", "Scene or pattern, such as `middlebury2003/teddy[views=0:9:2]`, `synthetic/*` or `paper`."
         ),
     ] = None,
-    record: Annotated[bool, Parameter(negative="", help="Also write a recording of every cell for `view`.")] = False,
-    row: Annotated[str | None, Parameter(help="Image row of the recordings' slices; default the middle one.")] = None,
+    record: Annotated[
+        list[str] | None,
+        Parameter(
+            consume_multiple=True,
+            negative="",
+            help="Also write a recording of every cell for `view`; default of all, "
+            "else of some of slices,volumes,space,surface,passes=N.",
+        ),
+    ] = None,
+    row: Annotated[
+        str | None,
+        Parameter(name=["--row", "--rows"], help="Image rows of the recordings' slices; default the middle one."),
+    ] = None,
     volumes: Annotated[
         bool, Parameter(negative="", help="Also keep and score the volumes of methods that have one.")
     ] = False,
@@ -205,6 +219,12 @@ def compare(
 
     `matbench compare -a okutomi_kanade -s 'middlebury2003/teddy[views=3 baseline=2,4,6]' --data DATA`
 
+    Recordings of chosen rows, or of chosen parts only:
+
+    `matbench compare -a materiality -s synthetic/box --record --rows 60,120,180`
+
+    `matbench compare -a materiality -s synthetic/box --record slices,passes=10`
+
     Scores of volumes, which are kept; and of predictions of the rightmost view, which is not given:
 
     `matbench compare -a materiality -s synthetic/box -m surface_f_1`
@@ -225,7 +245,7 @@ def compare(
     from matbench.commands import running
 
     check_metric(options.metric)
-    if row is not None and not record:
+    if row is not None and record is None:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
         running.say_missing(comparison.default_scenes(options.data)[1], options)
@@ -234,8 +254,7 @@ def compare(
         scene,
         settings=evolve(
             options.settings,
-            record=record,
-            row=None if row is None else _whole("row", row),
+            record=None if record is None else Recording.of(record, row),
             volumes=volumes or _is_of_volumes(options.metric),
         ),
         out=options.out,
@@ -355,15 +374,21 @@ def view(
     run: Path,
     cell: str | None = None,
     *,
+    compare: Annotated[
+        tuple[str, str] | None,
+        Parameter(negative="", help="Two cells of one scene, side by side: parts of their names or keys."),
+    ] = None,
     web: Annotated[bool, Parameter(negative="", help="In the browser instead of a window.")] = False,
 ) -> int:
-    """Open the recording of a cell.
+    """Open the recording of a cell, or those of two cells side by side.
 
     **Examples**
 
     `matbench view runs/1a2b3c4d`
 
     `matbench view runs/1a2b3c4d 'materiality on synthetic/box' --web`
+
+    `matbench view runs/1a2b3c4d --compare 'materiality on synthetic/box' 'multiview_sgm on synthetic/box'`
 
     Parameters
     ----------
@@ -372,10 +397,23 @@ def view(
     cell
         Part of the cell's name or key; not needed where there is only one recording.
     """
+    from tempfile import TemporaryDirectory
+
     from matbench import recording
     from matbench.store import Store
 
-    recording.view(run if run.suffix == ".rrd" else Store(run).recording(cell), web)
+    if compare is None:
+        recording.view(run if run.suffix == ".rrd" else Store(run).recording(cell), web)
+        return DONE
+    if run.suffix == ".rrd" or cell is not None:
+        raise UserError("--compare takes two cells of a run: matbench view RUN --compare A B")
+    from matbench import side_by_side
+
+    one, other = (Store(run).recording(part) for part in compare)
+    with TemporaryDirectory(prefix="matbench-") as folder:
+        path = Path(folder) / "compare.rrd"
+        side_by_side.merge(path, one, other)
+        recording.view(path, web)
     return DONE
 
 
@@ -386,6 +424,8 @@ app.command(
     "matbench.commands.export:app", name="export", help="Make one archive of a run: all that checks its tables."
 )
 app.command("matbench.commands.fetch:app", name="fetch", help="Download scenes, check them, and put them in place.")
+app.command("matbench.commands.report:app", name="report", help="Write the table of a finished run for a paper.")
+app.command("matbench.commands.figure:app", name="figure", help="Draw the figures of a finished run for a paper.")
 app.command("matbench.commands.scene:app", name="scene", help="Look at scenes, check them, and make your own.")
 
 

@@ -17,6 +17,7 @@ from matbench.dataset import Listing
 from matbench.errors import UserError, unknown
 from matbench.lock import locked
 from matbench.plan import Cell, Plan, make_plan, methods
+from matbench.recorded import Recording
 from matbench.repeats import unsteady
 from matbench.scene import NotInScene, Scene
 from matbench.scenes import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
@@ -242,7 +243,7 @@ def prepare(
     """
     if not 1 <= repeats <= 100:
         raise UserError(f"repeats {repeats} is not a whole number from 1 to 100")
-    row = settings.row
+    rows = settings.record.rows if settings.record is not None else ()
     files = [Path(file).resolve() for file in ([plugin] if isinstance(plugin, str | Path) else plugin)]
     seeds = _seeds(seed)
     own = [p.name for file in files for p in plugins.from_file(file).values()]
@@ -268,8 +269,9 @@ def prepare(
             raise UserError(
                 f"{name} has no ground truth of its reference view {ref}: only [predict=left] or [predict=right]"
             )
-        if row is not None and not 0 <= row < scene.height:
-            raise UserError(f"row {row} of {name}: 0 to {scene.height - 1} is possible")
+        for row in rows:
+            if not 0 <= row < scene.height:
+                raise UserError(f"row {row} of {name}: 0 to {scene.height - 1} is possible")
         kept = loaded.setdefault((scene.digest, scene.truth_digest), scene)
         if kept.name != scene.name:
             spellings[scene.name] = kept.name
@@ -296,11 +298,11 @@ def compare(
     *,
     data: str | Path | None = None,
     out: str | Path | None = None,
-    record: bool = False,
+    record: bool | Recording = False,
     volumes: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
-    row: int | None = None,
+    row: int | Sequence[int] | None = None,
     repeats: int = 1,
     settings: Settings = Settings(),
 ) -> "pd.DataFrame":
@@ -320,7 +322,7 @@ def compare(
         The run folder; ``runs/<digest of the request>`` if not given. A folder that holds the
         same request is resumed.
     record
-        Also write a rerun recording of every cell, from a second, untimed solve.
+        Also write a rerun recording of every cell, from a second, untimed solve: of all, or of what is chosen.
     volumes
         Also keep the volume of every cell whose method has one, and score it.
     seed
@@ -328,7 +330,7 @@ def compare(
     plugin
         Python files that hold further methods.
     row
-        The image row whose epipolar slices recordings show; the middle one if not given.
+        The image row whose epipolar slices recordings show, or several; the middle one if not given.
     repeats
         How often every cell is solved; more than once shows whether a method repeats itself.
     settings
@@ -344,12 +346,13 @@ def compare(
     UserError
         For anything asked for that cannot be; nothing is written then.
     """
+    wanted = record if isinstance(record, Recording) else Recording() if record else None
+    if wanted is not None and row is not None:
+        wanted = evolve(wanted, rows=[row] if isinstance(row, int) else row)
     comparison = prepare(
         algorithms,
         scenes,
-        settings=evolve(
-            settings, data=Path(data) if data is not None else None, record=record, row=row, volumes=volumes
-        ),
+        settings=evolve(settings, data=Path(data) if data is not None else None, record=wanted, volumes=volumes),
         out=out,
         seed=seed,
         plugin=plugin,

@@ -7,6 +7,7 @@ from attrs import field, frozen
 from attrs.validators import in_
 
 from matbench import limits
+from matbench.recorded import Recording
 
 Only = Literal["missing", "failed", "all"]
 
@@ -20,9 +21,7 @@ class Settings:
     data
         The folder of real scenes, if there is one.
     record
-        Write a recording of every cell, from a second, untimed solve.
-    row
-        The image row that recordings show; the middle one of each scene if None.
+        What to record of every cell, from a second, untimed solve; nothing if None.
     volumes
         Keep the volumes of the methods that have one.
     only
@@ -51,8 +50,7 @@ class Settings:
     """
 
     data: Path | None = None
-    record: bool = False
-    row: int | None = None
+    record: Recording | None = None
     volumes: bool = False
     only: Only | None = field(default=None, validator=in_((None, "missing", "failed", "all")))
     timeout: float | None = field(default=limits.HOUR, converter=limits.seconds)

@@ -22,6 +22,7 @@ from matbench import provenance
 from matbench.errors import UserError
 from matbench.lock import LOCK, WORK, locked
 from matbench.plan import Cell, Plan
+from matbench.recorded import Recording
 from matbench.volumes import StoredVolume
 
 Status = Literal["ok", "skipped", "failed", "timeout", "out-of-memory", "crashed", "interrupted"]
@@ -53,8 +54,8 @@ class Outcome:
         Did the estimate have a volume that could be kept? It is kept only on request.
     work, history
         As the estimate gave them; None for a number that is not finite.
-    row
-        The image row that its recording shows, if it has one.
+    recorded
+        What its recording holds, if it has one.
     alone
         Did no other cell of the run run meanwhile? Otherwise `seconds` is not comparable.
     maps
@@ -72,7 +73,7 @@ class Outcome:
     has_volume: bool = False
     work: Mapping[str, int] = {}
     history: Mapping[str, list[float | None]] = {}
-    row: int | None = None
+    recorded: Recording | None = None
     alone: bool = True
     maps: str = ""
     ran_on: Mapping[str, str] = {}

@@ -10,7 +10,7 @@ from matbench.store import FINAL, Outcome, Store
 def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
     """The cells that a run computes: by default those without a final outcome, or without what was asked for besides.
 
-    That is a recording that shows the row asked for, and the volume of a method that has one.
+    That is a recording that holds what is asked for, and the volume of a method that has one.
     `Settings.only` takes fewer, or all.
     """
     return [cell for cell, _ in _pending(plan, store, settings)]
@@ -48,11 +48,11 @@ def _lacks(cell: Cell, outcome: Outcome | None, store: Store, settings: Settings
         return ""
     if settings.volumes and outcome.has_volume and store.volume(cell) is None:
         return "its volume was not kept"
-    if not settings.record or outcome.status != "ok":
+    if settings.record is None or outcome.status != "ok":
         return ""
-    if not (store.cell(cell) / "recording.rrd").exists():
+    if outcome.recorded is None or not (store.cell(cell) / "recording.rrd").exists():
         return "it has no recording"
-    return "" if settings.row in (None, outcome.row) else f"its recording shows row {outcome.row}"
+    return "" if outcome.recorded.covers(settings.record) else "its recording holds less"
 
 
 def _reason(cell: Cell, outcome: Outcome | None, store: Store, settings: Settings) -> str:

@@ -153,21 +153,22 @@ def _solve(
 
 
 def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcome:
-    """Solve again, recorded; the outcome with the row shown, or why there is no recording: the answer itself stands."""
+    """Solve again, recorded; the outcome with what was, or why there is no recording: the answer itself stands."""
     from matbench.recording import record
 
+    assert job.settings.record is not None, "the caller has looked"  # noqa: S101
     scene = load_scene(job.cell.scene, job.settings.data)
-    row = scene.height // 2 if job.settings.row is None else job.settings.row
+    wanted = job.settings.record.at(scene.height)
 
     def solve(probe: Any) -> Estimate:
         return method.solve(hide_truth(scene), Context(job.cell.seed, job.threads, probe))
 
     try:
-        record(path, scene, solve, title=str(job.cell), row=row)
+        record(path, scene, solve, title=str(job.cell), wanted=wanted)
     except Exception as error:
         traceback.print_exc()
         return evolve(outcome, reason=f"not recorded: {type(error).__name__}: {first_line(error)}")
-    return evolve(outcome, row=row)
+    return evolve(outcome, recorded=wanted)
 
 
 def run_cell(job: Job, draft: Path) -> Outcome:
@@ -188,7 +189,7 @@ def run_cell(job: Job, draft: Path) -> Outcome:
         if evolve(scene).digest != cell.scene_digest:
             raise ValueError("the method wrote into its input")
         os.chdir(place)
-        if job.settings.record and not cell.repeat and outcome.status == "ok":
+        if job.settings.record is not None and not cell.repeat and outcome.status == "ok":
             outcome = _record(method, job, draft / "recording.rrd", outcome)
     except BaseException as error:  # SystemExit and KeyboardInterrupt, too: no signal comes here
         if os.getpid() != process:

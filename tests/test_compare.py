@@ -372,7 +372,8 @@ def test_recordings_are_written_on_request_and_found_by_name(tmp_path: Path) -> 
 def test_recordings_of_another_row_are_made_anew(tmp_path: Path) -> None:
     def shown() -> int:
         (path,) = (tmp_path / "run" / "cells").glob("*/cell.json")
-        return int(json.loads(path.read_text())["outcome"]["row"])
+        (row,) = json.loads(path.read_text())["outcome"]["recorded"]["rows"]
+        return int(row)
 
     compare(tmp_path, "flat", record=True)
     assert shown() == 36

@@ -48,13 +48,13 @@ def test_the_papers_setting_is_one_line(data_root: Path, tmp_path: Path) -> None
     assert chosen.labels == ("col2", "col3", "col4", "col5")
     space = search_space(chosen, params["fineness"])
     assert (space.first, space.last) == (0, 21)
-    assert facts["outcome"]["row"] == 144
+    assert facts["outcome"]["recorded"]["rows"] == [144]
     (path,) = tmp_path.glob("runs/paper/cells/*/recording.rrd")
     chunks = rr.chunk.RrdReader(path).stream()
     rows = {str(chunk.entity_path): chunk.to_record_batch().to_pylist()[0] for chunk in chunks}
-    assert "Epipolar slices** of row 144" in str(rows["/about"])
+    assert "Epipolar slices** of row 144:" in str(rows["/about"])
     # figure 2: the similarities of the pairs (0,1), (1,2), (2,3), the materialities and the derivative
-    assert {"/slices/similarity", "/slices/materiality", "/slices/derivative"} <= set(rows)
+    assert {f"/slices/144/{kind}" for kind in ("similarity", "visibility", "materiality", "derivative")} <= set(rows)
     volumes = [name.replace("\\", "") for name in rows if "volumes/similarity" in name]
     assert sorted(volumes) == [f"/volumes/similarity/col{k}-col{k + 1}" for k in (2, 3, 4)]
     (shape,) = (row["Tensor:data"][0]["shape"] for name, row in rows.items() if name == "/volumes/materiality")

@@ -1,0 +1,243 @@
+"""`matbench figure`: the paper's figures 2 and 3, of any run."""
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from attrs import evolve
+from cyclopts import App, Parameter
+
+from matbench.cli import DONE, Console, Data, Plugins
+from matbench.errors import UserError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from matbench.plan import Cell
+    from matbench.reports.columns import Drawn
+    from matbench.scene import Scene
+    from matbench.store import Store
+
+app = App(
+    name="figure",
+    help="Draw the figures of a finished run for a paper, in the size of a column: PDF, PNG, and the caption.",
+    help_epilogue="""\
+Beside each figure lie its caption as text and what a paper includes as LaTeX.
+
+**Examples**
+
+`matbench figure slice runs/1a2b3c4d 'materiality on middlebury2001/tsukuba' --row 144 --data DATA`
+
+`matbench figure maps runs/1a2b3c4d -s 'middlebury*/*' -a materiality -a sgbm --errors`
+""",
+    help_format="markdown",
+)
+
+Out = Annotated[
+    Path | None,
+    Parameter(name=["--out", "-o"], help="Where to, without an ending; default in the run folder."),
+]
+Width = Annotated[
+    Literal["column", "page"], Parameter(help="3.25 in, a column, or 6.875 in, both columns and what is between.")
+]
+
+
+@app.command(name="slice", help_epilogue="")
+def slice_(
+    run: Path,
+    cell: str | None = None,
+    *,
+    row: Annotated[str | None, Parameter(help="Image row; default the middle one.")] = None,
+    out: Out = None,
+    width: Width = "column",
+    data: Data = None,
+    plugin: Plugins = [],  # noqa: B006 -- never changed
+) -> int:
+    """Draw one epipolar plane of a cell: similarity, visibility, materiality, energy derivative (the paper's figure 2).
+
+    The cell is solved once more, listening; that the answer is the stored one is checked and said.
+
+    **Examples**
+
+    `matbench figure slice runs/1a2b3c4d --row 144`
+
+    `matbench figure slice runs/1a2b3c4d 'materiality on middlebury2003/teddy' --width page --data DATA`
+
+    Parameters
+    ----------
+    run
+        Folder of a finished run.
+    cell
+        Part of the cell's name or key; not needed where there is only one.
+    """
+    from matbench import plugins, spec
+    from matbench.algorithm import Context
+    from matbench.limits import cores
+    from matbench.listening import RecordingProbe
+    from matbench.recorded import Recording
+    from matbench.reports import slices
+    from matbench.store import Store
+    from matbench.worker import checked, hide_truth
+
+    store, console = Store(run), Console()
+    plan = store.plan()
+    chosen = _one(plan.cells, cell)
+    wanted = evolve(Recording.of(rows=row), volumes=False)
+    if len(wanted.rows) > 1:
+        raise UserError(f"row {row!r}: a figure shows one")
+    known = plugins.algorithms(plugin)
+    if chosen.method.algorithm not in known and plan.plugin_files:
+        # a run folder may come from anywhere: what it names is not executed
+        raise UserError(
+            f"{chosen.method.algorithm} is in a file of its own: add --plugin {shlex.join(plan.plugin_files)}"
+        )
+    found = plugins.algorithm(chosen.method.algorithm, plugin)
+    method = spec.build(found.name, found.load(), chosen.method.params)
+    scene = _scene(chosen, data, console)
+    if wanted.rows and wanted.rows[0] >= scene.height:
+        raise UserError(f"row {row} of {scene.name}: 0 to {scene.height - 1} is possible")
+    stem = _stem(out, run, f"slice-{chosen}")
+    unsupported = getattr(method, "unsupported_reason", None)
+    if unsupported and (reason := unsupported(scene)):
+        raise UserError(f"{chosen} was skipped: {reason}")
+    probe = RecordingProbe(wanted.at(scene.height))
+    with console.status(f"{chosen}: solving once more"):
+        hidden = hide_truth(scene)
+        estimate = method.solve(hidden, Context(chosen.seed, cores(), probe))
+        answer = checked(estimate, hidden)
+    plane = slices.epipolar_plane(scene, probe, estimate)
+    if plane is None:
+        raise UserError(f"{chosen.method} tells nothing of disparity space: no volume, no similarities")
+    stored = _stored(store, chosen, scene)
+    if stored is not None and not np.array_equal(stored, answer[scene.ref], equal_nan=True):
+        console.say("the answer differs from the stored one: the code has changed since the run, or was not repeatable")
+    with console.status("drawing"):
+        _write(slices.draw(scene, plane, str(chosen.method), width), stem, console)
+    return DONE
+
+
+@app.command(help_epilogue="")
+def maps(
+    run: Path,
+    *,
+    algorithm: Annotated[
+        list[str] | None,
+        Parameter(
+            name=["--algorithm", "-a"], consume_multiple=True, negative="", help="Part of a method's name; default all."
+        ),
+    ] = None,
+    scene: Annotated[
+        list[str] | None,
+        Parameter(name=["--scene", "-s"], consume_multiple=True, negative="", help="Scene or pattern; default all."),
+    ] = None,
+    errors: Annotated[bool, Parameter(negative="", help="Below each map its errors.")] = False,
+    out: Out = None,
+    width: Width = "column",
+    data: Data = None,
+) -> int:
+    """Draw reference views, true disparities and the methods' maps, one scene a column (the paper's figure 3).
+
+    Maps are those of the run folder; views and truths are read from the scenes. Of several seeds the first is shown.
+
+    **Examples**
+
+    `matbench figure maps runs/1a2b3c4d`
+
+    `matbench figure maps runs/1a2b3c4d -s 'synthetic/*' -a materiality --errors --width page`
+
+    Parameters
+    ----------
+    run
+        Folder of a finished run.
+    """
+    from matbench.reports import maps as figure
+    from matbench.store import Store
+
+    store, console = Store(run), Console()
+    cells = store.plan().cells
+    methods = list(dict.fromkeys(str(c.method) for c in cells))
+    names = list(dict.fromkeys(c.scene for c in cells))
+    methods = _matching("method", methods, algorithm)
+    names = _matching("scene", names, scene)
+    stem = _stem(out, run, "maps")
+    scenes: dict[str, Scene] = {}
+    found: dict[tuple[str, str], NDArray[np.float32]] = {}
+    with console.status("reading") as status:
+        for cell in cells:
+            if cell.scene not in names or str(cell.method) not in methods:
+                continue
+            if cell.scene not in scenes:
+                status.update(f"{cell.scene}: reading")
+                scenes[cell.scene] = _scene(cell, data, console)
+            known = scenes[cell.scene]
+            stored = _stored(store, cell, known)
+            if stored is not None and stored.shape == (known.height, known.width):
+                found.setdefault((str(cell.method), cell.scene), stored)
+    with console.status("drawing"):
+        drawn = figure.draw(figure.Maps(tuple(scenes[n] for n in names), tuple(methods), found), width, errors)
+        _write(drawn, stem, console)
+    return DONE
+
+
+def _one(cells: "Sequence[Cell]", part: str | None) -> "Cell":
+    """The one cell whose name or key contains `part`, or is it."""
+    hits = [c for c in cells if part is None or part in str(c) or part in c.key]
+    exact = [c for c in hits if str(c) == part]
+    if len(exact or hits) != 1:
+        which = f"{len(hits)} cells match {part!r}" if part else f"there are {len(hits)} cells"
+        raise UserError(f"{which}: name one of {'; '.join(str(c) for c in hits or cells)}")
+    return (exact or hits)[0]
+
+
+def _matching(kind: str, names: list[str], wanted: list[str] | None) -> list[str]:
+    """The names that are or match one of those wanted, or contain it."""
+    from fnmatch import fnmatchcase
+
+    if wanted is None:
+        return names
+    for one in wanted:
+        if not any(one in name or fnmatchcase(name, one) for name in names):
+            raise UserError(f"no {kind} of this run is or contains {one!r}: there are {', '.join(names)}")
+    exact = [name for name in names if name in wanted]
+    rest = [one for one in wanted if one not in exact]
+    return [n for n in names if n in exact or any(one in n or fnmatchcase(n, one) for one in rest)]
+
+
+def _scene(cell: "Cell", data: Path | None, console: Console) -> "Scene":
+    """The scene of a cell, as it was in the run."""
+    from matbench.scenes import load_scene
+
+    with console.status(f"{cell.scene}: reading"):
+        scene = load_scene(cell.scene, data)
+    if scene.digest != cell.scene_digest:
+        raise UserError(f"{cell.scene} is not what it was in the run: its images or its options' meaning have changed")
+    return scene
+
+
+def _stored(store: "Store", cell: "Cell", scene: "Scene") -> "NDArray[np.float32] | None":
+    """The stored map of the reference view of a cell that is ok."""
+    outcome = store.outcome(cell)
+    if outcome is None or outcome.status != "ok":
+        return None
+    return store.disparity(cell).get(scene.ref)
+
+
+def _stem(out: Path | None, run: Path, name: str) -> Path:
+    """Where a figure goes, without an ending; its folder is there."""
+    import re
+
+    stem = run / re.sub(r"[^\w.+]+", "-", name).strip("-.") if out is None else out
+    if stem.suffix.lower() in (".pdf", ".png"):
+        stem = stem.with_suffix("")
+    if not stem.parent.is_dir():
+        raise UserError(f"folder {str(stem.parent)!r} of --out does not exist")
+    return stem
+
+
+def _write(drawn: "Drawn", stem: Path, console: Console) -> None:
+    from matbench.reports import columns
+
+    for path in columns.write(drawn, stem):
+        console.say(f"{path.suffix[1:]}: {path}")

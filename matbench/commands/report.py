@@ -1,0 +1,78 @@
+"""`matbench report`: the table of a finished run, for a paper."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from matbench.cli import DONE, Console
+from matbench.errors import UserError
+
+app = App(
+    name="report",
+    help="Write the table of a finished run for a paper: LaTeX, Markdown or CSV.",
+    help_epilogue="""\
+It is made from `results.csv` and `cells.csv` of the run folder; no scene is needed and no method
+runs. Without a format the tables are printed as `compare` prints them.
+
+**Examples**
+
+`matbench report runs/1a2b3c4d`
+
+`matbench report runs/1a2b3c4d --format tex --out table.tex`
+
+`matbench report runs/1a2b3c4d --format md -m bad_2 --region nonocc all`
+
+`matbench report runs/1a2b3c4d --out means.csv --no-scenes`
+""",
+    help_format="markdown",
+)
+
+
+@app.default
+def report(
+    run: Path,
+    *,
+    format: Annotated[Literal["tex", "md", "csv"] | None, Parameter(help="Else that of --out's ending.")] = None,
+    out: Annotated[Path | None, Parameter(name=["--out", "-o"], help="The file; else it is printed.")] = None,
+    metric: Annotated[str, Parameter(name=["--metric", "-m"], help="What is shown.")] = "total_bad_1",
+    region: Annotated[
+        list[str] | None,
+        Parameter(consume_multiple=True, negative="", help="Its columns; default the field's own five."),
+    ] = None,
+    scenes: Annotated[bool, Parameter(help="After the means, every scene.")] = True,
+) -> int:
+    """Write methods x regions: means, mean ranks and every scene; best and second marked.
+
+    Parameters
+    ----------
+    run
+        Folder of a finished run.
+    """
+    from matbench import scoring
+    from matbench.reports import paper, tables
+    from matbench.store import write_text
+
+    if format is None and out is not None:
+        ending = out.suffix.lower().removeprefix(".")
+        if ending not in paper.FORMATS:
+            raise UserError(f"--out {str(out)!r} must end in .tex, .md or .csv, or name the --format")
+        format = ending
+    if out is not None and not out.parent.is_dir():
+        raise UserError(f"folder {str(out.parent)!r} of --out does not exist")
+    results, cells = paper.read(run)
+    higher = any(m.name == metric and m.better == "higher" for m in scoring.metrics())
+    made = paper.sheet(results, cells, metric, higher, region or (), scenes)
+    console = Console()
+    if format is None:
+        for table in tables.terminal(results, cells, metric, higher, console.width):
+            console.print(table)
+        return DONE
+    text = paper.write(made, format)
+    if out is None:
+        sys.stdout.write(text)
+    else:
+        write_text(out, text)
+        console.say(f"table: {out}")
+    return DONE

@@ -1,0 +1,100 @@
+"""Figures in the size of a paper's column: their look, their files, their captions."""
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from attrs import frozen
+
+from matbench.reports.paper import tex
+from matbench.store import write_bytes, write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Width = Literal["column", "page"]
+INCHES: dict[Width, float] = dict(zip(get_args(Width), (3.25, 6.875), strict=True))
+TALLEST = 9.0  # inches: what a page holds
+DOTS = 600  # of a PNG, per inch
+_LOOK = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],  # comes with matplotlib: the same letters everywhere
+    "font.size": 7,
+    "axes.titlesize": 7,
+    "axes.labelsize": 7,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+    "axes.linewidth": 0.5,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "xtick.major.size": 2,
+    "ytick.major.size": 2,
+    "axes.titlepad": 2.5,
+    "pdf.fonttype": 42,  # TrueType, embedded: what publishers ask for
+    "image.interpolation": "none",  # pixels stay pixels
+    "savefig.dpi": DOTS,
+}
+
+
+@frozen(eq=False)
+class Drawn:
+    """A figure and what stands below it.
+
+    Parameters
+    ----------
+    caption
+        In plain words; panels by their letters.
+    """
+
+    figure: "Figure"
+    caption: str
+
+
+@contextmanager
+def look() -> Iterator[None]:
+    """Small print for whatever is drawn and written meanwhile."""
+    from matplotlib import rc_context
+
+    settings: Any = _LOOK
+    with rc_context(settings):
+        yield
+
+
+def letter(number: int) -> str:
+    """0 -> "a", 26 -> "aa".
+
+    >>> letter(0), letter(27)
+    ('a', 'ab')
+    """
+    return (letter(number // 26 - 1) if number >= 26 else "") + chr(ord("a") + number % 26)
+
+
+def write(drawn: Drawn, stem: Path) -> list[Path]:
+    """Write a figure as PDF and PNG, its caption as text, and what a paper includes as LaTeX; the four paths."""
+    paths = [stem.with_name(stem.name + ending) for ending in (".pdf", ".png", ".txt", ".tex")]
+    for path in paths[:2]:
+        out = io.BytesIO()
+        undated = {"CreationDate": None} if path.suffix == ".pdf" else {}
+        with look():
+            drawn.figure.savefig(out, format=path.suffix[1:], metadata=undated)
+        write_bytes(path, out.getvalue())
+    write_text(paths[2], drawn.caption + "\n")
+    write_text(paths[3], _include(drawn, stem.name))
+    return paths
+
+
+def _include(drawn: Drawn, name: str) -> str:
+    width = drawn.figure.get_figwidth()
+    kind = "figure" if width <= INCHES["column"] else "figure*"
+    label = re.sub("[^A-Za-z0-9]+", "-", name).strip("-")
+    return f"""% needs \\usepackage[T1]{{fontenc}}, \\usepackage{{textcomp}} and \\usepackage{{graphicx}}
+\\begin{{{kind}}}
+\\centering
+\\includegraphics[width={width:g}in]{{{name}}}
+\\caption{{{tex(drawn.caption)}}}
+\\label{{fig:{label}}}
+\\end{{{kind}}}
+"""

@@ -1,0 +1,333 @@
+"""The table of a run as it goes into a paper: one frame, written as LaTeX, Markdown or CSV.
+
+What is shown is decided once, in `Sheet`; the formats only write its texts, so that they agree to
+the last digit, with one another and with the page.
+"""
+
+import csv
+import io
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal, get_args
+
+import pandas as pd
+from attrs import frozen
+
+from matbench.errors import UserError, unknown
+from matbench.reports import tables
+from matbench.reports.tables import METRIC, REGION, REGIONS, Shared
+from matbench.spec import first_line
+from matbench.statistics import FEW
+
+Format = Literal["tex", "md", "csv"]
+FORMATS: tuple[Format, ...] = get_args(Format)
+MEAN, RANK = "mean", "mean rank"
+NONE = "–"
+_RESULTS = {"algorithm": str, "params": str, "scene": str, "view": str, "region": str, "metric": str, "unit": str}
+_CELLS = {"algorithm": str, "params": str, "scene": str, "status": str, "reason": str}
+
+
+@frozen(eq=False)
+class Sheet:
+    """What a table says.
+
+    Parameters
+    ----------
+    metric, unit
+        What is shown.
+    higher
+        Is more of it better?
+    texts
+        One row for each method, over all scenes and in each: ``scene`` (`MEAN` for all), ``method``,
+        every region, `RANK`; numbers as shown, `NONE` where there is none.
+    places
+        The same rows and number columns: 1 best, 2 second, 0 neither.
+    unranked
+        Method -> why its means are not compared with the others'.
+    notes
+        What a reader must know besides: failed cells, too few scenes.
+    """
+
+    metric: str
+    unit: str
+    higher: bool
+    texts: pd.DataFrame
+    places: pd.DataFrame
+    unranked: Mapping[str, str]
+    notes: tuple[str, ...]
+
+    @property
+    def regions(self) -> list[str]:
+        return [str(c) for c in self.texts.columns if c not in ("scene", "method", RANK)]
+
+    @property
+    def has_scenes(self) -> bool:
+        """Are there rows of single scenes?"""
+        return bool((self.texts["scene"] != MEAN).any())
+
+    @property
+    def caption(self) -> str:
+        unit = f" ({self.unit})" if self.unit else ""
+        which = "higher" if self.higher else "lower"
+        rank = f"{RANK[0].upper()}{RANK[1:]}: over all scenes and the regions shown."
+        return f"{self.metric}{unit} by region; {which} is better. Best in bold, second underlined. {rank}"
+
+
+def read(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """``results.csv`` and ``cells.csv`` of a finished run; its scenes are not needed.
+
+    Raises
+    ------
+    UserError
+        If they are missing or damaged.
+    """
+    read = (_read(folder / "results.csv", _RESULTS, ("value", "pixels")), _read(folder / "cells.csv", _CELLS, ()))
+    return tables.labelled(read[0]), tables.labelled(read[1])
+
+
+def _read(path: Path, texts: Mapping[str, type], numbers: Sequence[str]) -> pd.DataFrame:
+    try:
+        # a method may be called "nan": only in columns of numbers does nothing mean missing
+        frame = pd.read_csv(path, dtype=dict(texts), keep_default_na=False)
+        for name in numbers:
+            frame[name] = pd.to_numeric(frame[name].replace("", None))
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}; give the folder of a finished run") from error
+    except (ValueError, KeyError) as error:
+        raise UserError(f"{path} is damaged: {first_line(error)}") from error
+    missing = [name for name in texts if name not in frame]
+    if missing:
+        raise UserError(f"{path} is damaged: it has no column {missing[0]!r}")
+    return frame
+
+
+def sheet(
+    results: pd.DataFrame,
+    cells: pd.DataFrame,
+    metric: str = METRIC,
+    higher: bool = False,
+    regions: Sequence[str] = (),
+    by_scene: bool = True,
+) -> Sheet:
+    """Decide what a run's table shows.
+
+    Parameters
+    ----------
+    results, cells
+        The two tables of a run.
+    metric
+        What is shown.
+    higher
+        Is more of it better?
+    regions
+        Its columns; the field's own of those that were scored, if none are named.
+    by_scene
+        Every scene after the means, if there are several?
+
+    Raises
+    ------
+    UserError
+        If nothing was scored by that metric, or in one of the regions.
+    """
+    results, cells = tables.labelled(results), tables.labelled(cells)
+    units = tables.metrics(results)
+    if metric not in units:
+        raise unknown("metric of this run", metric, units)
+    scored = tables.regions(results[results["metric"] == metric])
+    for region in regions:
+        if region not in scored:
+            raise unknown(f"region of {metric} in this run", region, scored)
+    chosen = list(dict.fromkeys(regions)) or [r for r in REGIONS if r in scored] or scored
+    scope, unit = tables.shared(results, cells), units[metric]
+    by_region = {
+        r: tables.per_scene(results, r, metric).reindex(index=list(scope.asked), columns=list(scope.methods))
+        for r in chosen
+    }
+    means = pd.DataFrame({r: tables.over_scenes(table, scope) for r, table in by_region.items()})
+    means[RANK] = _mean_ranks(by_region, scope, unit, higher, scope.scenes)
+    judged = means[REGION if REGION in chosen else chosen[0]]
+    unranked = pd.Series([not scope.is_ranked(m) for m in scope.methods], index=list(scope.methods))
+    order = pd.DataFrame({"unranked": unranked, "by": judged}).sort_values(
+        ["unranked", "by"], ascending=[True, not higher], kind="stable"
+    )
+    blocks = {MEAN: means}
+    for scene in scope.asked if by_scene and len(scope.asked) > 1 else ():
+        block = pd.DataFrame({r: table.loc[scene] for r, table in by_region.items()})
+        block = block.where(pd.Series({m: scene in scope.has[m] for m in scope.methods}), axis=0)
+        block[RANK] = _mean_ranks(by_region, scope, unit, higher, (scene,))
+        blocks[scene] = block
+    texts, places = [], []
+    for name, block in blocks.items():
+        rows = block.reindex([str(m) for m in order.index])
+        rivals = [m for m in rows.index if scope.is_ranked(m) or name != MEAN]
+        shown, marks = {}, {}
+        for column in rows.columns:
+            kind = "%" if column == RANK else unit  # ranks have two decimals, too
+            shown[column] = [tables.text(v, kind) for v in rows[column]]
+            found = tables.places(rows.loc[rivals, column], kind, higher and column != RANK)
+            marks[column] = [int(found.get(m, 0)) for m in rows.index]
+        texts.append(pd.DataFrame({"scene": name, "method": list(rows.index), **shown}))
+        places.append(pd.DataFrame(marks))
+    why = {
+        m: f"not ranked: mean over {len(scope.counted(m))} of {len(scope.asked)} scenes"
+        for m in scope.methods
+        if not scope.is_ranked(m)
+    }
+    return Sheet(
+        metric,
+        unit,
+        higher,
+        pd.concat(texts, ignore_index=True),
+        pd.concat(places, ignore_index=True),
+        why,
+        tuple(_notes(cells, scope)),
+    )
+
+
+def _mean_ranks(
+    by_region: Mapping[str, pd.DataFrame], scope: Shared, unit: str, higher: bool, scenes: Sequence[str]
+) -> pd.Series:
+    """Method -> mean of its ranks over scenes and regions, judged by what is shown: ties share their mean rank.
+
+    Only methods that have every shared scene are ranked; one without a value is last. A region that
+    is empty in a scene does not count, nor does a scene in which not all of them have a score.
+    """
+    rivals = [m for m in scope.methods if scope.is_ranked(m)]
+    found = []
+    for table in by_region.values():
+        for scene in scenes:
+            values = table.loc[scene, rivals]
+            if scene in scope.scenes and values.notna().any():
+                shown = values.map(lambda v: float(tables.text(v, unit)) if pd.notna(v) else float("nan"))
+                found.append(shown.rank(ascending=not higher, na_option="bottom"))
+    ranks = pd.concat(found, axis=1).mean(axis=1) if found else pd.Series(dtype=float)
+    return ranks.reindex(list(scope.methods))
+
+
+def _notes(cells: pd.DataFrame, scope: Shared) -> list[str]:
+    count = f"Means over {len(scope.scenes)} of {len(scope.asked)} scenes"
+    notes = [count + (": too few to conclude." if scope.distinct < FEW else ".")]
+    bad = cells[cells["status"] != "ok"]
+    for row in bad.to_dict("records"):
+        reason = "" if pd.isna(row.get("reason")) else " ".join(str(row["reason"]).split())
+        seed = f", seed {row['seed']}" if row.get("seed") else ""
+        notes.append(f"{row['method']} on {row['scene']}{seed}: {row['status']}" + (f" ({reason})." if reason else "."))
+    return notes
+
+
+def write(made: Sheet, format: Format) -> str:
+    """The table in one of `FORMATS`."""
+    return {"tex": latex, "md": markdown, "csv": comma_separated}[format](made)
+
+
+def comma_separated(made: Sheet) -> str:
+    """One row for each scene and method, `MEAN` first; what was left without a number is told in ``note``."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*made.texts.columns, "metric", "unit", "note"])
+    for row in made.texts.to_dict("records"):
+        note = made.unranked.get(row["method"], "") if row["scene"] == MEAN else ""
+        writer.writerow(["" if v == NONE else v for v in row.values()] + [made.metric, made.unit, note])
+    return out.getvalue()
+
+
+def _heads(made: Sheet) -> list[str]:
+    return ["scene", "method", *made.regions, RANK][0 if made.has_scenes else 1 :]
+
+
+def _rows(made: Sheet) -> "list[tuple[bool, list[tuple[str, int]]]]":
+    """Is it the first row of its scene? and its texts with their places; a scene's name stands once."""
+    out, before = [], None
+    for (_, row), (_, marks) in zip(made.texts.iterrows(), made.places.iterrows(), strict=True):
+        is_new = row["scene"] != before
+        before = row["scene"]
+        mark = "†" if row["scene"] == MEAN and row["method"] in made.unranked else ""
+        head = [(str(row["scene"]) if is_new else "", 0), (f"{row['method']}{mark}", 0)]
+        numbers = [(str(row[c]), int(marks[c])) for c in (*made.regions, RANK)]
+        out.append((is_new, [*head, *numbers][0 if made.has_scenes else 1 :]))
+    return out
+
+
+def _told(made: Sheet) -> list[str]:
+    return [*made.notes, *(f"† {method}: {why}." for method, why in made.unranked.items())]
+
+
+def markdown(made: Sheet) -> str:
+    """A table as GitHub and most others read it, its caption above and its notes below."""
+    marks = {0: "{}", 1: "**{}**", 2: "<ins>{}</ins>"}
+    heads, left = _heads(made), 2 if made.has_scenes else 1
+    lines = [md(made.caption), "", "| " + " | ".join(map(md, heads)) + " |"]
+    lines.append("|" + "|".join([" :-- "] * left + [" --: "] * (len(heads) - left)) + "|")
+    lines += ["| " + " | ".join(marks[place].format(md(text)) for text, place in row) + " |" for _, row in _rows(made)]
+    return "\n".join([*lines, "", *(f"- {md(note)}" for note in _told(made))]) + "\n"
+
+
+def md(text: str) -> str:
+    """A text that Markdown shows as it is.
+
+    >>> md("a_b|<c>")
+    'a\\\\_b\\\\|&lt;c&gt;'
+    """
+    line = " ".join(_printable(text).split())
+    line = line.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return re.sub(r"([\\`*_\[\]|~$#])", r"\\\1", line)
+
+
+_TEX = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedbl{}",
+    "'": r"\textquotesingle{}",
+    "`": r"\textasciigrave{}",
+    "-": "{-}",
+    "–": "--",
+    "…": r"\ldots{}",
+    "†": r"\textsuperscript{\textdagger}",
+    "→": r"$\to$",
+    **{mark: "\\" + mark for mark in "#$%&_"},
+}
+
+
+def tex(text: str) -> str:
+    r"""A text that LaTeX sets as it is, with the packages that `latex` names; what it cannot set becomes "?".
+
+    >>> tex("a_b{50%}")
+    'a\\_b\\{50\\%\\}'
+    """
+    return "".join(_TEX.get(c, c if c.isascii() or c.isalpha() else "?") for c in " ".join(_printable(text).split()))
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() or c.isspace() else "?" for c in text)
+
+
+def latex(made: Sheet) -> str:
+    """A floating table for ``\\usepackage{booktabs}`` and ``\\usepackage[T1]{fontenc}``, notes below it."""
+    marks = {0: "{}", 1: r"\textbf{{{}}}", 2: r"\underline{{{}}}"}
+    heads, left = _heads(made), 2 if made.has_scenes else 1
+    lines = [
+        r"% needs \usepackage[T1]{fontenc}, \usepackage{textcomp} and \usepackage{booktabs}",
+        r"\begin{table}",
+        r"\centering\footnotesize",
+        rf"\caption{{{tex(made.caption)}}}",
+        rf"\label{{tab:{re.sub('[^A-Za-z0-9]+', '-', made.metric).strip('-')}}}",
+        rf"\begin{{tabular}}{{{'l' * left + 'r' * (len(heads) - left)}}}",
+        r"\toprule",
+        " & ".join(map(tex, heads)) + r" \\",
+    ]
+    for is_new, row in _rows(made):
+        if is_new:
+            lines.append(r"\midrule")
+        # a number is set in mathematics only where it has a sign
+        cells = [marks[place].format(re.sub(r"^\{-\}(?=\d)", r"$-$", tex(text))) for text, place in row]
+        lines.append(" & ".join(cells) + r" \\")
+    lines += [r"\bottomrule", r"\end{tabular}", r"\par\smallskip"]
+    lines += [rf"\parbox{{\linewidth}}{{\footnotesize {tex(note)}}}\par" for note in _told(made)]
+    return "\n".join([*lines, r"\end{table}"]) + "\n"

@@ -1,0 +1,208 @@
+"""The table of a run for a paper: every format says the same, and nothing in a name does anything."""
+
+import csv
+import io
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from matbench.cli import main
+from matbench.errors import UserError
+from matbench.reports import paper, tables
+from matbench.reports.content import Report
+
+AWKWARD = r"50% of_a\b {c}|d & $e$ #f ~g ^h *i* `j` <k> 'l' " + '"m" ä – 雪'
+
+
+def awkward(report: Report) -> Report:
+    """The made-up run with one method called by all that LaTeX, Markdown and CSV read as marks."""
+    for frame in (report.results, report.cells):
+        frame["params"] = frame["params"].replace("", AWKWARD)
+    return report
+
+
+def made(report: Report, **options: object) -> paper.Sheet:
+    return paper.sheet(report.results, report.cells, **options)  # type: ignore[arg-type]
+
+
+def from_csv(text: str) -> list[list[str]]:
+    return [row[: row.index("total_bad_1")] for row in list(csv.reader(io.StringIO(text)))[1:]]
+
+
+def from_md(text: str) -> list[list[str]]:
+    rows = [line for line in text.splitlines() if line.startswith("| ")][2:]
+    cells = [[c.strip() for c in re.split(r"(?<!\\)\|", row)[1:-1]] for row in rows]
+    return [[re.sub(r"^(\*\*|<ins>)(.*?)(\*\*|</ins>)$", r"\2", c) for c in row] for row in cells]
+
+
+def from_tex(text: str) -> list[list[str]]:
+    body = text.partition(r"\midrule")[2].partition(r"\bottomrule")[0]
+    rows = [row.replace(r"\midrule", "").strip() for row in re.split(r"\\\\\n", body)]
+    cells = [[c.strip() for c in re.split(r"(?<!\\)&", row)] for row in rows if row]
+    return [[re.sub(r"^\\(textbf|underline)\{(.*)\}$", r"\2", c) for c in row] for row in cells]
+
+
+def test_all_formats_have_the_same_numbers_in_the_same_places(report: Report) -> None:
+    sheet = made(awkward(report))
+    found = {f: paper.write(sheet, f) for f in paper.FORMATS}
+    rows = {"csv": from_csv(found["csv"]), "md": from_md(found["md"]), "tex": from_tex(found["tex"])}
+    assert len(rows["csv"]) == 9, "three methods: their means and two scenes"
+    numbers = {
+        name: [[{"": "–", "--": "–"}.get(c, c) for c in row[2:]] for row in table] for name, table in rows.items()
+    }
+    assert numbers["csv"] == numbers["md"] == numbers["tex"]
+    expected = sheet.texts.drop(columns=["scene", "method"]).to_numpy().tolist()
+    assert numbers["csv"] == expected
+    for name in ("csv", "md", "tex"):
+        assert {len(row) for row in rows[name]} == {len(sheet.regions) + 3}, "no name breaks its row"
+    # and they are those of the page's tables, as shown there
+    scope = tables.shared(report.results, report.cells)
+    for region in sheet.regions:
+        means = tables.means(report.results, scope, region, "total_bad_1")
+        shown = dict(zip(sheet.texts["method"][:3], sheet.texts[region][:3], strict=True))
+        assert shown == {m: tables.text(v, "%") for m, v in means.items()}
+
+
+def test_marks_stand_where_the_numbers_are_best(report: Report) -> None:
+    sheet = made(report)
+    md, tex = paper.markdown(sheet), paper.latex(sheet)
+    # 10, 20 and 30 by construction; the third lacks a scene: its mean is not compared
+    assert "**10.51**" in md
+    assert "<ins>20.51</ins>" in md
+    assert r"\textbf{10.51}" in tex
+    assert r"\underline{20.51}" in tex
+    assert not re.search(r"(\*\*|<ins>)30\.01[^|]*\|.*†", md)
+    assert "†" in md
+    assert sheet.texts.loc[0, "mean rank"] == "1.00"
+    assert sheet.texts["mean rank"].tolist()[:3] == ["1.00", "2.00", "–"]
+
+
+def test_mean_ranks_are_over_scenes_and_regions() -> None:
+    values = {("a", "s1"): (1, 5), ("b", "s1"): (2, 4), ("a", "s2"): (3.001, 1), ("b", "s2"): (3.002, 1)}
+    rows = [
+        (m, "", s, "v", 0, region, "total_bad_1", v, "%", 9)
+        for (m, s), both in values.items()
+        for region, v in zip(("all", "occ"), both, strict=True)
+    ]
+    columns = ["algorithm", "params", "scene", "view", "seed", "region", "metric", "value", "unit", "pixels"]
+    results = pd.DataFrame(rows, columns=columns)
+    cells = results[["algorithm", "params", "scene", "seed"]].drop_duplicates().assign(status="ok", seconds=1.0)
+    sheet = paper.sheet(results, cells)
+    # ranks of a: 1 and 2 in s1; what is shown alike shares 1.5, twice, in s2
+    assert sheet.texts["mean rank"][:2].tolist() == ["1.50", "1.50"]
+    ranked = paper.sheet(results, cells, regions=["all"])
+    assert ranked.texts.set_index(["scene", "method"])["mean rank"].to_dict() == {
+        ("mean", "a"): "1.25",
+        ("mean", "b"): "1.75",
+        ("s1", "a"): "1.00",
+        ("s1", "b"): "2.00",
+        ("s2", "a"): "1.50",
+        ("s2", "b"): "1.50",
+    }
+    higher = paper.sheet(results, cells, higher=True, regions=["all"])
+    assert higher.texts["mean rank"][:2].tolist() == ["1.25", "1.75"]
+    assert higher.texts["method"][0] == "b"
+
+
+def test_failed_cells_are_in_the_notes_of_every_format(report: Report) -> None:
+    sheet = made(report)
+    for text in (paper.markdown(sheet), paper.latex(sheet)):
+        assert "failed (ValueError: " in text.replace("\\", "")
+        assert "too few to conclude" in text
+        assert "not ranked: mean over 1 of 2 scenes" in text
+    assert "not ranked: mean over 1 of 2 scenes" in paper.comma_separated(sheet)
+
+
+def test_markdown_shows_marks_and_runs_none() -> None:
+    shown = paper.md(AWKWARD)
+    assert "<k>" not in shown
+    assert not re.search(r"(?<!\\)[|*_`$#~]", shown)
+    assert paper.md("a\nb\x00") == "a b?"
+
+
+def test_latex_is_balanced_whatever_the_names(report: Report) -> None:
+    text = paper.latex(made(awkward(report)))
+    plain = re.sub(r"\\[\\{}%&#$_]", "", text)
+    assert plain.count("{") == plain.count("}")
+    lines = [line for line in plain.splitlines() if not line.startswith("%")]
+    assert not re.search(r"[#~^%]", "\n".join(lines))
+    assert text.count(r"\begin{") == text.count(r"\end{") == 2
+    assert "?" in paper.tex("\x07")
+
+
+@pytest.mark.skipif(not shutil.which("pdflatex"), reason="no pdflatex here: only the structure is checked")
+def test_latex_compiles(report: Report, tmp_path: Path) -> None:
+    table = paper.latex(made(awkward(report))).replace("雪", "?")  # which only other engines set
+    # without booktabs where it is not installed: its rules are lines
+    rules = "".join(rf"\providecommand{{\{rule}rule}}{{\hline}}" for rule in ("top", "mid", "bottom"))
+    packages = r"\usepackage[T1]{fontenc}\usepackage{textcomp}\IfFileExists{booktabs.sty}{\usepackage{booktabs}}"
+    head = rf"\documentclass{{article}}{packages}{rules}"
+    (tmp_path / "t.tex").write_text(rf"{head}\begin{{document}}{table}\end{{document}}")
+    line = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "t.tex"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, errors="replace", timeout=120)
+    assert done.returncode == 0, done.stdout[-2000:]
+
+
+@pytest.fixture
+def run(report: Report, tmp_path: Path) -> Path:
+    """A run folder without plan, cells and scenes: its tables are enough."""
+    report.results.to_csv(tmp_path / "results.csv", index=False)
+    report.cells.to_csv(tmp_path / "cells.csv", index=False)
+    return tmp_path
+
+
+def test_tables_read_back_give_the_same_sheet(report: Report, run: Path) -> None:
+    pd.testing.assert_frame_equal(paper.sheet(*paper.read(run)).texts, made(report).texts)
+
+
+def matbench(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(tokens)
+    said = capsys.readouterr()
+    return int(stop.value.code or 0), said.out, said.err
+
+
+def test_the_command_prints_or_writes(run: Path, report: Report, capsys: pytest.CaptureFixture[str]) -> None:
+    assert matbench(capsys, "report", str(run), "--format", "md") == (0, paper.markdown(made(report)), "")
+    status, out, _ = matbench(capsys, "report", str(run))
+    assert status == 0
+    assert "10.51" in out
+    place = run / "t.csv"
+    line = ["report", str(run), "-o", str(place), "-m", "avg", "--region", "occ", "all", "--no-scenes"]
+    assert matbench(capsys, *line)[0] == 0
+    table = pd.read_csv(place)
+    assert list(table.columns) == ["scene", "method", "occ", "all", "mean rank", "metric", "unit", "note"]
+    assert set(table.scene) == {"mean"}
+    scope = tables.shared(report.results, report.cells)
+    expected = tables.means(report.results, scope, "occ", "avg")["good"]
+    assert np.isclose(table.occ[0], round(expected, 2))
+
+
+@pytest.mark.parametrize(
+    ("tokens", "said"),
+    [
+        (["--format", "doc"], "doc"),
+        (["-o", "t.doc"], "must end in .tex, .md or .csv"),
+        (["-o", "/no/such/t.md"], "folder '/no/such' of --out does not exist"),
+        (["-m", "total_bad_3"], "unknown metric of this run 'total_bad_3': did you mean 'total_bad_1'?"),
+        (["--region", "ocd"], "unknown region of total_bad_1 in this run 'ocd': did you mean 'occ'?"),
+    ],
+)
+def test_wrong_usage_is_one_line(run: Path, capsys: pytest.CaptureFixture[str], tokens: list[str], said: str) -> None:
+    status, out, err = matbench(capsys, "report", str(run), *tokens)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+
+
+def test_a_folder_that_is_no_finished_run(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "cannot be read" in matbench(capsys, "report", str(run / "none"))[2]
+    (run / "results.csv").write_text("a,b\n1,2\n")
+    assert "is damaged" in matbench(capsys, "report", str(run))[2]
+    (run / "results.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UserError, match="is damaged"):
+        paper.read(run)
