@@ -94,7 +94,7 @@ def _mean(parts: Sequence[tuple[str, NDArray[np.float64]]]) -> NDArray[np.float6
 
 
 def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
-    """A panel for each region: per cent of pixels with an error above each threshold, a curve for each ranked method."""
+    """A panel for each region: share of pixels with an error above each threshold, a curve for each ranked method."""
     measured = {region for part in spreads.values() for region in part.above}
     found = [region for region in REGIONS if region in measured]
     methods = [m for m in scope.methods if scope.is_ranked(m)]
@@ -111,7 +111,7 @@ def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
 
 
 def by_views(spreads: Spreads, scope: Shared) -> "tuple[Figure | None, list[str]]":
-    """A panel for each number of views: total_bad_1 against how many of them see a pixel; and what it is over, in words."""
+    """A panel for each number of views: total_bad_1 against how many of them see a pixel; and what to beware of."""
     methods = [m for m in scope.methods if scope.is_ranked(m)]
     shared = {s: part for (_, s), part in spreads.items() if s in scope.scenes}
     panels, said = [], []

@@ -120,20 +120,23 @@ class Numbers:
         return pd.Series({m: self.scope.is_ranked(m) for m in self.scope.methods}, dtype=bool)
 
     def _by_metric(self, make: Any) -> dict[str, dict[str, Any]]:
-        return {m: {r: make(m, r, self._tables[m, r]) for r in self.regions} for m in self.units}
+        return {m: {r: make(m, self._tables[m, r]) for r in self.regions} for m in self.units}
 
     @cached_property
     def means(self) -> dict[str, dict[str, dict[str, Entry]]]:
         """Metric -> region -> method -> entry."""
-        return self._by_metric(
-            lambda m, r, t: entries(tables.over_scenes(t, self.scope), self._ranked, self.units[m], self.is_higher(m))
-        )
+
+        def make(metric: str, table: pd.DataFrame) -> dict[str, Entry]:
+            means = tables.over_scenes(table, self.scope)
+            return entries(means, self._ranked, self.units[metric], self.is_higher(metric))
+
+        return self._by_metric(make)
 
     @cached_property
     def ranks(self) -> dict[str, dict[str, dict[str, Entry]]]:
         """Metric -> region -> method -> entry with its mean rank."""
 
-        def make(metric: str, region: str, table: pd.DataFrame) -> dict[str, Entry]:
+        def make(metric: str, table: pd.DataFrame) -> dict[str, Entry]:
             ranks = standing.mean_ranks(table, self.scope, self.units[metric], self.is_higher(metric))
             return entries(pd.Series(ranks, dtype=float), self._ranked, "%", higher=False)
 
@@ -148,7 +151,7 @@ class Numbers:
             s: pd.Series({m: s in self.scope.has[m] for m in self.scope.methods}, dtype=bool) for s in self.scope.asked
         }
 
-        def make(metric: str, region: str, table: pd.DataFrame) -> list[list[Entry]]:
+        def make(metric: str, table: pd.DataFrame) -> list[list[Entry]]:
             out = []
             for scene, row in table.iterrows():
                 here = has[str(scene)]
@@ -186,7 +189,7 @@ class Numbers:
         return out
 
     def against(self, metric: str, region: str, reference: str | None = None) -> list[dict[str, Any]]:
-        """How far each ranked method is from a reference, by default the best: the lines of a table, as the script makes them."""
+        """How far each ranked method is from a reference, by default the best: a table's lines, as the script's."""
         found = self.differences[metric][region] if self.units else []
         means = self.means[metric][region] if self.units else {}
         known = standing.references(self.scope)

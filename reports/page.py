@@ -13,12 +13,12 @@ from attrs import evolve
 from markupsafe import Markup, escape
 
 from matbench import coloring
+from matbench.regions import REGIONS
 from matbench.reports import curves, errors, figures, passes, switches, tables
 from matbench.reports.content import Report
-from matbench.reports.numbers import AT, COSTS, Numbers, incomparable
+from matbench.reports.numbers import COSTS, Numbers, incomparable
 from matbench.reports.pictures import gallery
 from matbench.reports.tables import METRIC, REGION, Shared
-from matbench.regions import REGIONS
 from matbench.statistics import FEW
 from matbench.store import write_text
 

@@ -286,7 +286,7 @@
     draw(picture, width, height, (x, y, out, k) => {
       if (together) return together(x, y, out, k);
       (x < at ? sides[0] : sides[1])(x, y, out, k);
-      if (x === at || x === at - 1) out.fill(x === at ? 0 : 255, k, k + 3); // where the two meet
+      if (at > 0 && at < width && (x === at || x === at - 1)) out.fill(x === at ? 0 : 255, k, k + 3); // where the two meet
     });
     wipe.disabled = both;
     const words = maps.map((map, i) => {
