@@ -53,7 +53,7 @@ def dress(axes: "Axes", size: float = 8) -> None:
     """Axes in the page's colour, with a light grid."""
     axes.tick_params(which="both", colors=INK, labelsize=size)
     for along in (axes.xaxis, axes.yaxis):
-        along.label.set_size(size + 1)
+        along.label.set_fontsize(size + 1)
     axes.grid(True, alpha=0.25, lw=0.6, color=INK)
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(INK)
@@ -209,8 +209,8 @@ def cost(rows: pd.DataFrame, score: str, unit: str, against: str = "seconds", co
     axes = figure.subplots()
     if compared:
         along = front(points)
-        ends = {"color": INK, "lw": 1, "ls": (0, (3, 3)), "alpha": 0.6}
-        axes.step([p[0] for p in along], [p[1] for p in along], where="post", **ends)
+        look: dict[str, Any] = {"color": INK, "lw": 1, "ls": (0, (3, 3)), "alpha": 0.6}
+        axes.step([p[0] for p in along], [p[1] for p in along], where="post", **look)
     axes.scatter([p[0] for p in points], [p[1] for p in points], s=52, color="#3b78c3", edgecolor=INK, lw=0.8, zorder=3)
     axes.set_xscale("log")
     xs = [p[0] for p in points]

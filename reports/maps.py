@@ -86,7 +86,7 @@ def size_within(height: int, width: int, side: int) -> tuple[int, int]:
 
 def thinned(values: NDArray[np.float32], side: int) -> NDArray[np.float32]:
     """A map with the longer side at most `side`: some of its pixels, as they are."""
-    rows, columns = size_within(*values.shape, side)
+    rows, columns = size_within(values.shape[0], values.shape[1], side)
     if (rows, columns) == values.shape:
         return values
     return np.asarray(cv2.resize(values, (columns, rows), interpolation=cv2.INTER_NEAREST), np.float32)
@@ -94,7 +94,7 @@ def thinned(values: NDArray[np.float32], side: int) -> NDArray[np.float32]:
 
 def photograph(picture: NDArray[np.uint8], side: int) -> str:
     """(H, W, 3) RGB -> a WebP as ``data:`` address, blended to `side`."""
-    rows, columns = size_within(*picture.shape[:2], side)
+    rows, columns = size_within(picture.shape[0], picture.shape[1], side)
     smaller = picture
     if (rows, columns) != picture.shape[:2]:
         smaller = np.asarray(cv2.resize(picture, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)

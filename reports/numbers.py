@@ -111,9 +111,10 @@ class Numbers:
     def _tables(self) -> Mapping[tuple[str, str], pd.DataFrame]:
         """(metric, region) -> scenes x methods."""
         found = tables.every_scene(self.report.results)
-        names = {"index": list(self.scope.asked), "columns": list(self.scope.methods)}
-        nothing = pd.DataFrame(**names, dtype=float)
-        return {(m, r): found.get((m, r), nothing).reindex(**names) for m in self.units for r in self.regions}
+        scenes, methods = list(self.scope.asked), list(self.scope.methods)
+        nothing = pd.DataFrame(np.nan, index=scenes, columns=methods)
+        both = [(m, r) for m in self.units for r in self.regions]
+        return {one: found.get(one, nothing).reindex(index=scenes, columns=methods) for one in both}
 
     @cached_property
     def _ranked(self) -> pd.Series:

@@ -129,7 +129,9 @@ def _map(
 def _slices(report: Report, scene: Scene, cells: list[dict[str, Any]], side: int) -> list[dict[str, Any]]:
     """Row by row: the similarity of the views and, of every method with a volume, materiality and visibility."""
     rows = slices.rows_of(scene, report.row)
-    out = [{"row": row, "similarity": _picture(slices.similarity(scene, row), side), "methods": {}} for row in rows]
+    out: list[dict[str, Any]] = [
+        {"row": row, "similarity": _picture(slices.similarity(scene, row), side), "methods": {}} for row in rows
+    ]
     for cell in cells:
         volume = report.volumes(*_names(cell)) if cell["status"] == "ok" else None
         for row, part in zip(rows, out, strict=True):

@@ -83,9 +83,9 @@ def materiality(stored: StoredVolume, scene: Scene, row: int) -> tuple[Slice, Sl
     if scene.ref not in stored.views or not 0 <= row < stored.space.rows or stored.space.width != scene.width:
         return None
     space, ref = evolve(stored.space, rows=1), stored.views.index(scene.ref)
-    volume = Volume(space, stored.levels[row : row + 1] / np.float32(255), stored.views)
-    seen = sum(visibility(volume, view) for view in range(space.views)) / space.views
+    volume = Volume(space, stored.levels[row : row + 1] * np.float32(1 / 255), stored.views)
+    seen = np.mean([visibility(volume, view) for view in range(space.views)], axis=0)
     step = (stored.views[1] - stored.views[0]) * space.fineness  # samples to a pixel per view step of the scene
     ends = (space.first - 0.5) / step, (space.last + 0.5) / step
-    material, sight = (as_bytes(np.asarray(space.in_view(v, ref)[0, ::-1], float)) for v in (volume.values, seen))
-    return Slice(material, ends), Slice(sight, ends)
+    material, sight = (space.in_view(v, ref)[0, ::-1].astype(np.float32) for v in (volume.values, seen))
+    return Slice(as_bytes(material), ends), Slice(as_bytes(sight), ends)
