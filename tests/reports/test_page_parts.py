@@ -180,7 +180,7 @@ def test_energies_are_drawn_relative_to_their_first_pass(report: Report) -> None
     )
     figure = passes.energies(told, scope)
     assert figure is not None
-    assert [list(line.get_ydata()) for line in figure.axes[0].get_lines()][0] == [100, 50, 25]
+    assert list(figure.axes[0].get_lines()[0].get_ydata()) == [100, 50, 25]
     assert passes.lines(told, scope) == [["good", "total", "2", "3", "-50.0"]]
     assert "No method told" in page.render(report)
     assert "No method told" not in page.render(told)
