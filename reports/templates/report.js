@@ -283,6 +283,7 @@
     const both = difference && isMap[0] && isMap[1];
     const at = Math.round((width * Number(wipe.value)) / 100);
     const together = both && painter("difference", scene, of[0], of[1], false);
+    picture.parentElement.style.setProperty("--ratio", String(width / height));
     draw(picture, width, height, (x, y, out, k) => {
       if (together) return together(x, y, out, k);
       (x < at ? sides[0] : sides[1])(x, y, out, k);

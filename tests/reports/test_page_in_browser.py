@@ -138,6 +138,8 @@ def test_maps_are_drawn_slid_and_subtracted_by_keyboard(shown: Any, report: Repo
     shown.execute_script("arguments[0].focus()", opener)
     opener.send_keys(Keys.ENTER)
     wait(shown, "return document.querySelector('#large-caption').textContent.startsWith('left')")
+    box = shown.find_element(By.ID, "large-picture").size
+    assert box["width"] / box["height"] == pytest.approx(24 / 16, abs=0.02), "not distorted"
     truth = pixel(shown, "#large-picture", 23, 8)
     unknown = pixel(shown, "#large-picture", 23, 0)
     assert unknown == [128, 128, 128], "right is the truth, unknown in its first rows"
