@@ -73,9 +73,9 @@ class Coding:
         return _address("png", np.vstack([coarse, fine]).astype(np.uint8), _QUICK)
 
 
-def side_for(cells: int) -> int:
-    """The longer side of a map, px: what keeps the page of any run below its size."""
-    return int(np.clip(5120 / max(1, cells) ** 0.5, 160, 1024))
+def side_for(pictures: int) -> int:
+    """The longer side of a picture, px, with so many of them: what keeps the page of any run small."""
+    return int(np.clip(6100 / max(1, pictures) ** 0.5, 160, 1024))
 
 
 def size_within(height: int, width: int, side: int) -> tuple[int, int]:

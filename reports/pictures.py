@@ -14,6 +14,8 @@ from matbench.reports.maps import Coding, exact, photograph, side_for, size_with
 from matbench.reports.tables import Shared
 from matbench.scene import Scene
 
+_BESIDES = 4  # pictures of a scene besides its methods': the truth, the view, slices
+
 
 @frozen(eq=False)
 class Gallery:
@@ -39,7 +41,7 @@ class Gallery:
 
 def gallery(report: Report, scope: Shared) -> Gallery:
     """Read every map once, and every volume that was kept."""
-    side = side_for(len(scope.methods) * len(scope.asked))
+    side = side_for((len(scope.methods) + _BESIDES) * len(scope.asked))
     out = Gallery([], [], [], {})
     spreads: dict[tuple[str, str], errors.Spread] = {}
     for name in scope.asked:
