@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from matbench.metrics import error_map
 from matbench.scene import Scene
 
-DISPARITY, ERROR = "viridis", "magma"
+DISPARITY, ERROR, DIFFERENCE = "viridis", "magma", "PuOr"
 WORST = 4.0  # px of the pair: errors from here on have the last colour
 UNKNOWN = 128  # grey of unknown truth
-_STRIPES = (196, 250)  # two greys: no answer, for every kind of eye
+STRIPES = (196, 250)  # two greys: no answer, for every kind of eye
 
 Picture = NDArray[np.uint8]
 """(H, W, 3) RGB."""
@@ -34,7 +34,7 @@ def stripes(rows: int, columns: int) -> Picture:
     """Diagonal stripes, about 36 across the longer side."""
     period = max(4, max(rows, columns) // 36)
     light = (np.add.outer(np.arange(rows), np.arange(columns)) % period) * 2 >= period
-    return np.repeat(np.where(light, _STRIPES[1], _STRIPES[0]).astype(np.uint8)[:, :, None], 3, axis=2)
+    return np.repeat(np.where(light, STRIPES[1], STRIPES[0]).astype(np.uint8)[:, :, None], 3, axis=2)
 
 
 def colors(values: NDArray[np.floating], ends: tuple[float, float], name: str, levels: int = 256) -> Picture:

@@ -23,6 +23,7 @@ from matbench.scene import NotInScene, Scene
 from matbench.scenes import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
 from matbench.settings import Settings
 from matbench.store import FolderLost, Outcome, Store, write_text
+from matbench.volumes import StoredVolume
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -135,12 +136,18 @@ class Comparison:
         stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.scored}
         path = self.folder / "report.html"
 
+        outcomes = {key: self.store.outcome(cell) for key, cell in stored.items()}
+
         def disparity(algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
-            cell = stored[algorithm, params, scene, seed]
-            outcome = self.store.outcome(cell)
+            outcome = outcomes[algorithm, params, scene, seed]
             if outcome is None or outcome.status != "ok":
                 return None
-            return self.store.disparity(cell)[self.scenes[scene].ref]
+            return self.store.disparity(stored[algorithm, params, scene, seed])[self.scenes[scene].ref]
+
+        def volume(algorithm: str, params: str, scene: str, seed: int) -> StoredVolume | None:
+            outcome = outcomes[algorithm, params, scene, seed]
+            kept = outcome is not None and outcome.has_volume
+            return self.store.volume(stored[algorithm, params, scene, seed]) if kept else None
 
         page.write(
             path,
@@ -156,6 +163,10 @@ class Comparison:
                 sweeps=tuple(sweeps),
                 reliability=reliability,
                 higher=frozenset(m.name for m in scoring.metrics() if m.better == "higher"),
+                volumes=volume,
+                histories={key: outcome.history for key, outcome in outcomes.items() if outcome is not None},
+                parameters={(c.method.algorithm, c.method.changed): c.method.params for c in self.plan.cells},
+                rows=self.settings.record.rows if self.settings.record is not None else (),
             ),
         )
         return path

@@ -1,6 +1,6 @@
 """What a report is made of: everything that the page shows, as one frozen value."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -8,12 +8,21 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 
 from matbench.scene import Scene
+from matbench.spec import Value
 from matbench.sweeps import Sweep
+from matbench.volumes import StoredVolume
 
 Key = tuple[str, str, str, int]
 """Algorithm, parameters, scene and seed: the names of a cell."""
 
 Maps = Mapping[Key, NDArray[np.float32] | None] | Callable[[str, str, str, int], NDArray[np.float32] | None]
+
+Volumes = Callable[[str, str, str, int], StoredVolume | None]
+History = Mapping[str, Sequence[float | None]]
+
+
+def _no_volume(*_: object) -> None:
+    return None
 
 
 @frozen(eq=False)
@@ -46,6 +55,14 @@ class Report:
         Reliability curves of the volumes that were kept (`matbench.scoring.reliabilities`).
     higher
         Metrics of which more is better; of all others, less is.
+    volumes
+        Cell -> the volume that was kept, or None; read one at a time.
+    histories
+        Cell -> what it told of every pass, such as energies; None for a number that is not finite.
+    parameters
+        Method, as `cells` names it by algorithm and params -> every parameter with its value.
+    rows
+        The image rows of the epipolar slices, where some were asked for.
     """
 
     title: str
@@ -59,6 +76,10 @@ class Report:
     sweeps: tuple[Sweep, ...] = ()
     reliability: pd.DataFrame | None = None
     higher: frozenset[str] = frozenset()
+    volumes: Volumes = _no_volume
+    histories: Mapping[Key, History] = field(factory=dict)
+    parameters: Mapping[tuple[str, str], Mapping[str, Value]] = field(factory=dict)
+    rows: Sequence[int] = ()
 
     def disparity(self, algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
         """(H, W) disparity map of a cell, or None; also None where its size is not the scene's."""

@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from matbench.reports.figures import INK, printable
+from matbench.reports.figures import ACROSS, INK, dress, grid_of, line_style, name_curves
 from matbench.reports.tables import METRIC, label, metrics, regions
 from matbench.reports.tables import text as shown
 from matbench.statistics import FEW
@@ -32,12 +32,6 @@ WORDS = {
     "vignetting": "vignetting (share)",
 }
 IN_TERMINAL = ("nonocc", "all", "occ")
-
-# Okabe & Ito 2008: told apart by all kinds of eyes; the shapes of points tell them apart without colour
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-_POINTS = ("o", "s", "^", "D", "v", "P")
-_LINES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
-_ACROSS = 3  # panels side by side
 
 
 def title(sweep: Sweep) -> str:
@@ -126,41 +120,30 @@ def figure(sweep: Sweep, metric: str = METRIC) -> "Figure | None":
     names = regions(rows)
     if not names:
         return None
-    from matplotlib.figure import Figure
-
-    across = min(_ACROSS, len(names))
-    down = -(-len(names) // across)
-    drawn = Figure(figsize=(7.2, 0.4 + 1.95 * down), layout="constrained")
-    grid = drawn.subplots(down, across, squeeze=False)
-    for axes in grid.flat[len(names) :]:
-        axes.set_axis_off()
+    drawn, grid = grid_of(len(names))
     methods = [str(method) for method in rows["method"].unique()]
-    for place, (name, axes) in enumerate(zip(names, grid.flat, strict=False)):
+    for place, (name, axes) in enumerate(zip(names, grid, strict=True)):
         here = rows[rows["region"] == name]
         _panel(axes, sweep, here, methods)
         count = int(here["scenes"].iloc[0])
         few = f" ({_scenes(count)})" if count != len(sweep.scenes) else ""
         axes.set_title(name + few, loc="left", fontsize=9, color=INK, parse_math=False)
-        if place % across == 0:
+        if place % ACROSS == 0:
             axes.set_ylabel(f"{metric}, {here['unit'].iloc[0]}" if here["unit"].iloc[0] else metric, color=INK)
-        if place + across >= len(names):
+        if place + ACROSS >= len(names):
             axes.set_xlabel(sweep.option if sweep.of else WORDS.get(sweep.option, sweep.option), color=INK)
-    drawn.draw_without_rendering()
-    for row in grid:
-        last = [axes for axes in row if axes.axison][-1]
-        _name_curves(last, methods, beside_nothing=last is row[-1])
+    name_curves(drawn, methods)
     return drawn
 
 
 def _panel(axes: "Axes", sweep: Sweep, rows: pd.DataFrame, methods: Sequence[str]) -> None:
     for index, method in enumerate(methods):
         curve = rows[rows["method"] == method]
-        colour, point = _COLOURS[index % len(_COLOURS)], _POINTS[index % len(_POINTS)]
-        line = _LINES[index // len(_COLOURS) % len(_LINES)]
+        style = line_style(index)
         values = curve["value"].to_numpy(np.float64)
-        axes.plot(values, curve["mean"], color=colour, marker=point, ms=4.5, lw=1.6, ls=line, mec=INK, mew=0.5)
+        axes.plot(values, curve["mean"], **style)
         if curve["low"].notna().all() and len(curve):
-            axes.fill_between(values, curve["low"], curve["high"], color=colour, alpha=0.15, lw=0)
+            axes.fill_between(values, curve["low"], curve["high"], color=style["color"], alpha=0.15, lw=0)
     least, largest = sweep.values[0], sweep.values[-1]
     if least > 0 and largest > 50 * least:
         axes.set_xscale("log")
@@ -168,43 +151,4 @@ def _panel(axes: "Axes", sweep: Sweep, rows: pd.DataFrame, methods: Sequence[str
         axes.set_xticks(list(sweep.values), [f"{v:g}" for v in sweep.values])
         axes.minorticks_off()
     axes.set_ylim(bottom=min(0.0, float(rows["mean"].min())))
-    axes.tick_params(colors=INK, labelsize=8)
-    axes.grid(True, alpha=0.25, lw=0.6, color=INK)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(INK)
-
-
-def _name_curves(axes: "Axes", methods: Sequence[str], beside_nothing: bool) -> None:
-    """Write each method's name at the end of its curve, moved apart where they would touch."""
-    ends = []
-    for method, line in zip(methods, axes.get_lines(), strict=True):
-        x, y = (np.asarray(values, np.float64) for values in line.get_data())
-        if len(x):
-            height = float(axes.transData.transform([(x[-1], y[-1])])[0, 1])
-            ends.append((height, (x[-1], y[-1]), line.get_color(), printable(method, 34)))
-    step = 72 / axes.figure.dpi  # points in a dot
-    ends.sort(key=lambda one: one[0])
-    names = [name.replace("[", "\n[", 1) for *_, name in ends]
-    rooms = [13 * (name.count("\n") + 1) for name in names]
-    middles: list[float] = []
-    for (height, *_), room in zip(ends, rooms, strict=True):  # upwards from the lowest
-        floor = middles[-1] + (rooms[len(middles) - 1] + room) / 2 if middles else -np.inf
-        middles.append(max(height * step, floor))
-    ceiling = axes.bbox.y1 * step + 6
-    for place in reversed(range(len(middles))):  # and down again from the panel's top
-        middles[place] = min(middles[place], ceiling - rooms[place] / 2)
-        ceiling = middles[place] - rooms[place] / 2
-    for (height, end, colour, _), broken, middle in zip(ends, names, middles, strict=True):
-        axes.annotate(
-            broken,
-            end,
-            (14, middle - height * step),
-            textcoords="offset points",
-            va="center",
-            fontsize=8,
-            linespacing=1.3,
-            color=INK,
-            parse_math=False,
-            annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": colour, "lw": 1, "shrinkA": 1, "shrinkB": 3, "relpos": (0, 0.5)},
-        ).set_in_layout(beside_nothing)
+    dress(axes)

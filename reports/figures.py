@@ -1,12 +1,10 @@
-"""Pictures for the page: encoded maps, colour bars, accuracy against seconds."""
+"""Figures of the page: accuracy against cost, curves in panels, reliability; and how they become SVG."""
 
 import io
 import re
-from base64 import b64encode
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -18,29 +16,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SIDE = 512  # px; larger pictures are made smaller
-LEVELS = 128  # steps of a colour scale: no eye sees them, and files are a quarter smaller
 INK = "#01fe02"  # stands for the page's text colour until the SVG is written
+ACROSS = 3  # panels side by side
 
-
-def _smaller(picture: NDArray[np.uint8], exact: bool) -> NDArray[np.uint8]:
-    rows, columns = picture.shape[:2]
-    shrink = SIDE / max(rows, columns)
-    if shrink >= 1:
-        return picture
-    size = max(1, round(columns * shrink)), max(1, round(rows * shrink))
-    made = cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST if exact else cv2.INTER_AREA)
-    return made.astype(np.uint8, copy=False)
-
-
-def data_uri(picture: NDArray[np.uint8], exact: bool = True) -> str:
-    """(H, W, 3) RGB -> a WebP as ``data:`` address: lossless if `exact`, else as a photograph."""
-    quality = 101 if exact else 88
-    bgr = np.ascontiguousarray(_smaller(picture, exact)[..., ::-1])
-    done, encoded = cv2.imencode(".webp", bgr, [cv2.IMWRITE_WEBP_QUALITY, quality])
-    if not done:
-        raise RuntimeError(f"OpenCV could not encode a picture of {bgr.shape[1]}x{bgr.shape[0]} px")
-    return "data:image/webp;base64," + b64encode(encoded.tobytes()).decode("ascii")
+# Okabe & Ito 2008: told apart by all kinds of eyes; the shapes of points tell them apart without colour
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+_POINTS = ("o", "s", "^", "D", "v", "P", "X")
+_LINES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 
 
 def gradient(name: str, stops: int = 17) -> str:
@@ -52,6 +34,103 @@ def printable(name: str, longest: int = 44) -> str:
     """A name of at most `longest` characters, none of which do anything."""
     name = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in name)
     return name if len(name) <= longest else name[: longest // 2] + "…" + name[1 - longest // 2 :]
+
+
+def line_style(index: int) -> dict[str, Any]:
+    """Colour, points and line of the method with that number, the same in every figure."""
+    return {
+        "color": _COLOURS[index % len(_COLOURS)],
+        "marker": _POINTS[index % len(_POINTS)],
+        "ls": _LINES[index // len(_COLOURS) % len(_LINES)],
+        "ms": 4.5,
+        "lw": 1.6,
+        "mec": INK,
+        "mew": 0.5,
+    }
+
+
+def dress(axes: "Axes", size: float = 8) -> None:
+    """Axes in the page's colour, with a light grid."""
+    axes.tick_params(which="both", colors=INK, labelsize=size)
+    for along in (axes.xaxis, axes.yaxis):
+        along.label.set_fontsize(size + 1)
+    axes.grid(True, alpha=0.25, lw=0.6, color=INK)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(INK)
+
+
+def grid_of(count: int) -> "tuple[Figure, list[Axes]]":
+    """A figure with as many panels, `ACROSS` side by side, and their axes."""
+    from matplotlib.figure import Figure
+
+    across = min(ACROSS, count)
+    down = -(-count // across)
+    figure = Figure(figsize=(7.2, 0.5 + 1.95 * down), layout="constrained")
+    axes = list(figure.subplots(down, across, squeeze=False).flat)
+    for unused in axes[count:]:
+        unused.set_axis_off()
+    return figure, axes[:count]
+
+
+def name_curves(figure: "Figure", methods: Sequence[str]) -> None:
+    """The methods' names below all panels, each with its line."""
+    from matplotlib.lines import Line2D
+
+    names = [printable(method) for method in methods]
+    longest = max(map(len, names), default=0)
+    columns = max(1, min(4, len(names), 100 // (longest + 8)))
+    handles = [Line2D([], [], **line_style(i)) for i in range(len(names))]
+    legend = figure.legend(
+        handles, names, loc="outside lower left", ncols=columns, frameon=False, fontsize=8, labelcolor=INK
+    )
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+    # room for its lines, which the panels would else give up
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(width, height + 0.2 * -(-len(names) // columns))
+
+
+Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def panels(
+    parts: Sequence[tuple[str, Mapping[str, Curve]]], across: str, up: str, every: int = 1, backwards: bool = False
+) -> "Figure | None":
+    """A panel for each part: its title, and method -> (x, y); None where there is no curve.
+
+    Parameters
+    ----------
+    across, up
+        Names of the axes.
+    every
+        Which points are marked.
+    backwards
+        Whole numbers along x, the largest first.
+    """
+    parts = [(title, curves) for title, curves in parts if curves]
+    if not parts:
+        return None
+    methods = list(dict.fromkeys(method for _, curves in parts for method in curves))
+    figure, grid = grid_of(len(parts))
+    for place, (axes, (title, curves)) in enumerate(zip(grid, parts, strict=True)):
+        for index, method in enumerate(methods):
+            if method in curves:
+                axes.plot(*curves[method], markevery=every, **line_style(index))
+        dress(axes)
+        axes.set_title(title, loc="left", fontsize=9, color=INK, parse_math=False)
+        axes.set_ylim(bottom=0)
+        if backwards:
+            axes.set_xticks(sorted({x for xs, _ in curves.values() for x in xs.tolist()}))
+            axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
+            axes.invert_xaxis()
+        else:
+            axes.set_xlim(left=0)
+        if place % ACROSS == 0:
+            axes.set_ylabel(up, color=INK)
+        if place + ACROSS >= len(parts):
+            axes.set_xlabel(across, color=INK)
+    name_curves(figure, methods)
+    return figure
 
 
 def _place_labels(figure: "Figure", axes: "Axes", points: Sequence[tuple[float, float, str]]) -> None:
@@ -100,8 +179,11 @@ def front(points: Sequence[tuple[float, float, str]]) -> list[tuple[float, float
     return kept
 
 
-def cost(rows: pd.DataFrame, score: str, unit: str) -> "Figure | None":
-    """Accuracy against seconds: a point per ranked method of `tables.summary`, or None without any.
+COSTS = {"seconds": "seconds per scene (logarithmic)", "memory": "peak memory, MiB (logarithmic)"}
+
+
+def cost(rows: pd.DataFrame, score: str, unit: str, against: str = "seconds", compared: bool = True) -> "Figure | None":
+    """Accuracy against what it costs: a point per ranked method of `tables.summary`, or None without any.
 
     Parameters
     ----------
@@ -111,32 +193,35 @@ def cost(rows: pd.DataFrame, score: str, unit: str) -> "Figure | None":
         Its column for the vertical axis; less is better.
     unit
         Of that column.
+    against
+        Its column for the horizontal axis, one of `COSTS`.
+    compared
+        Are the costs of one machine, so that there is a front of methods that no other beats in both?
     """
-    ranked = rows[rows["ranked"]].dropna(subset=[score, "seconds"])
-    points = [(max(float(r["seconds"]), 1e-4), float(r[score]), printable(str(m))) for m, r in ranked.iterrows()]
+    ranked = rows[rows["ranked"]].dropna(subset=[score, against])
+    points = [(max(float(r[against]), 1e-4), float(r[score]), printable(str(m))) for m, r in ranked.iterrows()]
     if not points:
         return None
     from matplotlib.figure import Figure
-    from matplotlib.ticker import FuncFormatter, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     axes = figure.subplots()
-    along = front(points)
-    axes.step([p[0] for p in along], [p[1] for p in along], where="post", color=INK, lw=1, ls=(0, (3, 3)), alpha=0.6)
+    if compared:
+        along = front(points)
+        look: dict[str, Any] = {"color": INK, "lw": 1, "ls": (0, (3, 3)), "alpha": 0.6}
+        axes.step([p[0] for p in along], [p[1] for p in along], where="post", **look)
     axes.scatter([p[0] for p in points], [p[1] for p in points], s=52, color="#3b78c3", edgecolor=INK, lw=0.8, zorder=3)
     axes.set_xscale("log")
     xs = [p[0] for p in points]
     axes.set_xlim(min(xs) / 1.8, max(xs) * 1.8)
     axes.set_ylim(0, max(p[1] for p in points) * 1.18 or 1)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if max(xs) > 100 * min(xs) else (1.0, 2.0, 5.0)))
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    minor = FuncFormatter(lambda value, _: f"{value:g}") if max(xs) < 10 * min(xs) else NullFormatter()
-    axes.xaxis.set_minor_formatter(minor)
-    axes.set_xlabel("seconds per scene (logarithmic)", color=INK)
+    axes.set_xlabel(COSTS[against], color=INK)
     axes.set_ylabel(f"{score}, {unit}", color=INK)
-    axes.tick_params(which="both", colors=INK)
-    axes.grid(True, alpha=0.25, lw=0.6, color=INK)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(INK)
+    dress(axes, size=10)
     _place_labels(figure, axes, points)
     return figure
 
@@ -153,7 +238,7 @@ def reliability(curves: pd.DataFrame | None) -> "Figure | None":
         return None
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(4.6, 3.9), layout="constrained")
+    figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     axes = figure.subplots()
     axes.plot([0, 1], [0, 1], color=INK, lw=1, ls=(0, (3, 3)), alpha=0.6)
     for number, ((algorithm, params), rows) in enumerate(curves.groupby(["algorithm", "params"], sort=False)):
@@ -163,15 +248,14 @@ def reliability(curves: pd.DataFrame | None) -> "Figure | None":
         pooled = sums.groupby(place).sum()
         x, y = (pooled[name] / pooled["points"] for name in ("materiality", "observed"))
         name = printable(label(str(algorithm), str(params)))
-        axes.plot(x, y, marker="osD^v"[number % 5], ms=5, lw=1.4, color=f"C{number}", label=name)
+        axes.plot(x, y, label=name, **line_style(number))
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
     axes.set_xlabel("materiality", color=INK)
     axes.set_ylabel("share of points with a surface", color=INK)
-    axes.tick_params(which="both", colors=INK)
-    axes.grid(True, alpha=0.25, lw=0.6, color=INK)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(INK)
-    for text in axes.legend(frameon=False, labelcolor=INK, loc="upper left").get_texts():
+    dress(axes)
+    axes.set_anchor("W")
+    legend = axes.legend(frameon=False, labelcolor=INK, loc="upper left", bbox_to_anchor=(1.02, 1), fontsize=8)
+    for text in legend.get_texts():
         text.set_parse_math(False)
     return figure
 

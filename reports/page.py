@@ -2,8 +2,6 @@
 
 import re
 from base64 import b64encode
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -15,18 +13,18 @@ from attrs import evolve
 from markupsafe import Markup, escape
 
 from matbench import coloring
-from matbench.reports import curves, figures, switches, tables
+from matbench.regions import REGIONS
+from matbench.reports import curves, errors, figures, passes, switches, tables
 from matbench.reports.content import Report
+from matbench.reports.numbers import COSTS, Numbers, incomparable
+from matbench.reports.pictures import gallery
 from matbench.reports.tables import METRIC, REGION, Shared
-from matbench.scene import Scene
 from matbench.statistics import FEW
 from matbench.store import write_text
 
 __all__ = ["Report", "render", "write"]
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-CAPTIONED = ("nonocc", "all", "occ")
 
 
 def write(path: Path, report: Report) -> None:
@@ -42,6 +40,8 @@ def render(report: Report) -> str:
     rows = tables.summary(report.results, report.cells)
     # one order everywhere: best first
     scope = evolve(tables.shared(report.results, report.cells), methods=tuple(str(m) for m in rows.index))
+    numbers = Numbers(report, scope)
+    shown = gallery(report, scope)
     template = files("matbench.reports") / "templates"
     script = (template / "report.js").read_text(encoding="utf-8")
     environment = Environment(
@@ -51,38 +51,68 @@ def render(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.policies["json.dumps_kwargs"] = {"sort_keys": False}  # columns are in the order of the regions
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "separators": (",", ":")}
     environment.filters["breakable"] = _breakable
+    by_views, by_views_notes = errors.by_views(shown.spreads, scope)
     return environment.get_template("report.html.j2").render(
         report=report,
         scope=scope,
+        numbers=numbers,
         few=FEW,
         style=(template / "report.css").read_text(encoding="utf-8"),
         script=script,
         script_hash=b64encode(sha256(script.encode()).digest()).decode("ascii"),
         answer=_answer(rows, scope),
         counts=report.cells["status"].value_counts().to_dict(),
-        table=_default_table(rows),
-        regions=tables.summarised(report.results),
-        scenes_table=_default_scenes(report, scope),
-        data=_data(report, scope),
-        figure=_figure(rows),
+        table=_table(numbers, rows),
+        costs={name: COSTS[name] for name in numbers.costs},
+        incomparable=incomparable(report.cells),
+        differences=numbers.against(numbers.metric, numbers.region) if numbers.units else [],
+        about=REGIONS,
+        scenes=shown.scenes,
+        slices=next((rows[0] for rows in shown.slices if rows), None),
+        has_volumes=any(row["methods"] for rows in shown.slices for row in rows),
+        energies=_svg(passes.energies(report, scope)),
+        passes=passes.lines(report, scope),
+        by_views=_svg(by_views),
+        by_views_notes=by_views_notes,
+        reliability=_svg(figures.reliability(report.reliability)),
+        cost_figures=_cost_figures(numbers, rows),
+        thresholds=_svg(errors.thresholds(shown.spreads, scope)),
         curves=_curves(report),
-        scenes=_scenes(report, scope),
+        switches=[] if report.ablation is None else switches.lines(report.ablation).values.tolist(),
+        forest=None if report.ablation is None else _svg(switches.forest(report.ablation)),
+        bad=_records(report.cells[report.cells["status"] != "ok"], ("method", "scene", "seed", "status", "reason")),
+        methods=_methods(report),
         disparity_bar=figures.gradient(coloring.DISPARITY),
         error_bar=figures.gradient(coloring.ERROR),
+        difference_bar=figures.gradient(coloring.DIFFERENCE),
         error_limit=coloring.WORST,
-        bad=_records(report.cells[report.cells["status"] != "ok"], ("method", "scene", "seed", "status", "reason")),
-        methods=_methods(report.cells),
-        switches=[] if report.ablation is None else switches.lines(report.ablation).values.tolist(),
-        reliability=_svg(figures.reliability(report.reliability)),
-        forest=None if report.ablation is None else _svg(switches.forest(report.ablation)),
+        data={
+            **numbers.data(),
+            "few": FEW,
+            "worst": coloring.WORST,
+            "unknown": coloring.UNKNOWN,
+            "stripes": coloring.STRIPES,
+            "colors": {
+                "disparity": _hex(coloring.DISPARITY),
+                "error": _hex(coloring.ERROR),
+                "difference": _hex(coloring.DIFFERENCE),
+            },
+            "codings": shown.codings,
+            "slices": shown.slices,
+        },
     )
 
 
 def _breakable(name: str) -> Markup:
     """A name, escaped, that may go on in the next line after its marks."""
     return Markup("<wbr>").join(escape(part) for part in re.split(r"(?<=[_\[=/,])", name))
+
+
+def _hex(name: str) -> str:
+    """A colour map's 256 colours, six hexadecimal digits each."""
+    return coloring.palette(name).tobytes().hex()
 
 
 def _answer(rows: pd.DataFrame, scope: Shared) -> dict[str, Any]:
@@ -104,23 +134,18 @@ def _answer(rows: pd.DataFrame, scope: Shared) -> dict[str, Any]:
     }
 
 
-def _entries(values: pd.Series, ranked: pd.Series, unit: str, higher: bool) -> dict[str, list[Any]]:
-    """Method -> [number or None, as shown, place]: what a cell of a table needs, here and in the script."""
-    marks = tables.places(values[ranked], unit, higher)
-    return {
-        str(m): [None if pd.isna(v) else float(v), tables.text(v, unit), int(marks.get(m, 0))]
-        for m, v in values.items()
-    }
-
-
-def _default_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    """The summary's rows, as they stand in the page before anything is chosen."""
-    units = {c: "s" if c == "seconds" else "px" if c == "avg all" else "%" for c in rows.columns[:-3]}
-    entries = {c: _entries(rows[c], rows["ranked"], unit, higher=False) for c, unit in units.items()}
+def _table(numbers: Numbers, rows: pd.DataFrame) -> list[dict[str, Any]]:
+    """Method by method: mean rank, every score, costs, as they stand in the page before anything is chosen."""
+    if not numbers.units:
+        return []
+    ranks = numbers.ranks[numbers.metric][numbers.region]
+    region = numbers.region
+    scores = {score: numbers.means[numbers.metric_of(score)][region] for score in numbers.scores}
+    columns = [ranks, *((scores | numbers.costs)[column] for column in numbers.columns)]
     return [
         {
             "method": str(m),
-            "cells": [entries[c][str(m)] for c in units],
+            "cells": [column[str(m)] for column in columns],
             "scenes": int(row["scenes"]),
             "asked": int(row["asked"]),
             "ranked": bool(row["ranked"]),
@@ -129,49 +154,16 @@ def _default_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
     ]
 
 
-def _scene_entries(report: Report, scope: Shared, table: pd.DataFrame, metric: str) -> list[list[list[Any]]]:
-    """Scenes x methods of entries; the status stands where a cell did not end well."""
-    unit, higher = tables.metrics(report.results).get(metric, ""), metric in report.higher
-    bad = report.cells[report.cells["status"] != "ok"]
-    status = {(m, s): state for m, s, state in zip(bad["method"], bad["scene"], bad["status"], strict=True)}
-    out = []
-    for scene, row in table.reindex(index=scope.asked, columns=scope.methods).iterrows():
-        has = pd.Series({m: scene in scope.has[m] for m in scope.methods}, dtype=bool)
-        entries = _entries(row.where(has), has, unit, higher)
-        for m in scope.methods:
-            if (m, scene) in status:
-                entries[m] = [None, str(status[m, scene]), 0]
-        out.append([entries[m] for m in scope.methods])
-    return out
-
-
-def _default_scenes(report: Report, scope: Shared) -> list[tuple[str, list[list[Any]]]]:
-    table = tables.per_scene(report.results, REGION, METRIC)
-    return list(zip(scope.asked, _scene_entries(report, scope, table, METRIC), strict=True))
-
-
-def _data(report: Report, scope: Shared) -> dict[str, Any]:
-    """Everything that the page lets one choose: summary and scenes for each metric and region."""
-    units, found = tables.metrics(report.results), tables.regions(report.results)
-    shown = tables.summarised(report.results)
-    ranked = pd.Series({m: scope.is_ranked(m) for m in scope.methods}, dtype=bool)
-    parts = {(str(m), str(r)): part for (m, r), part in report.results.groupby(["metric", "region"], sort=False)}
-    means: dict[str, dict[str, Any]] = {m: {} for m in units}
-    scenes: dict[str, dict[str, Any]] = {m: {} for m in units}
-    for metric, unit in units.items():
-        for region in dict.fromkeys((*shown, *found)):
-            part = parts.get((metric, region), report.results.iloc[:0])
-            table = tables.per_scene(part, region, metric)
-            if region in found:
-                scenes[metric][region] = _scene_entries(report, scope, table, metric)
-            if region in shown:
-                mean = tables.over_scenes(table, scope)
-                means[metric][region] = _entries(mean, ranked, unit, metric in report.higher)
-    return {"methods": list(scope.methods), "regions": found, "units": units, "means": means, "scenes": scenes}
-
-
-def _figure(rows: pd.DataFrame) -> str | None:
-    return _svg(figures.cost(rows, f"{METRIC} {REGION}", "%"))
+def _cost_figures(numbers: Numbers, rows: pd.DataFrame) -> list[str]:
+    """Accuracy against seconds, and against memory."""
+    memory = {m: entry[0] for m, entry in numbers.costs.get("peak_mb", {}).items()}
+    costs = rows.assign(memory=pd.Series(memory, dtype=float).reindex(rows.index))
+    score, compared = f"{METRIC} {REGION}", not incomparable(numbers.report.cells)
+    drawn = (
+        figures.cost(costs, score, "%", compared=compared),
+        figures.cost(costs, score, "%", "memory"),
+    )
+    return [figures.svg(figure) for figure in drawn if figure is not None]
 
 
 def _svg(figure: "Figure | None") -> str | None:
@@ -192,89 +184,19 @@ def _curves(report: Report) -> list[dict[str, Any]]:
     ]
 
 
-def _scenes(report: Report, scope: Shared) -> Iterator[dict[str, Any]]:
-    """Scene by scene, the pictures: made when the template comes to them."""
-    for name in scope.asked:
-        cells = sorted(_first_seeds(report.cells, name), key=lambda c: scope.methods.index(c["method"]))
-        scene = report.scenes.get(name)
-        if scene is None:
-            yield {"name": name, "known": False}
-            continue
-        truth = scene.truth.get(scene.ref)
-        low, high = coloring.disparity_ends(scene)
-        yield {
-            "name": name,
-            "known": True,
-            "views": scene.n,
-            "ref": scene.labels[scene.ref],
-            "size": (scene.width, scene.height),
-            "pair_steps": f"{scene.pair_steps:g}",
-            "scale": [f"{v:.3g}" for v in (low, (low + high) / 2, high)],
-            "view": figures.data_uri(scene.views[scene.ref], exact=False),
-            "truth": None
-            if truth is None
-            else figures.data_uri(coloring.truth_colors(truth, (low, high), figures.LEVELS)),
-            "methods": _all_pictures(report, scene, cells, (low, high)),
-        }
-
-
-def _first_seeds(cells: pd.DataFrame, scene: str) -> list[dict[str, Any]]:
-    """One cell for each method on a scene: its first that is ok, else its first."""
-    here = cells[cells["scene"] == scene].assign(bad=lambda c: c["status"] != "ok")
-    first = here.sort_values("bad", kind="stable").drop_duplicates("method").sort_index()
-    seeds = here.groupby("method").size()
-    return [{**row, "seeds": int(seeds[row["method"]])} for row in _dicts(first)]
-
-
-def _all_pictures(
-    report: Report, scene: Scene, cells: list[dict[str, Any]], ends: tuple[float, float]
-) -> list[dict[str, Any]]:
-    with ThreadPoolExecutor() as pool:  # the encoder lets go of the interpreter
-        return list(pool.map(lambda cell: _pictures(report, scene, cell, ends), cells))
-
-
-def _pictures(report: Report, scene: Scene, cell: dict[str, Any], ends: tuple[float, float]) -> dict[str, Any]:
-    names = str(cell["algorithm"]), str(cell["params"]), str(cell["scene"]), int(cell["seed"])
-    disparity = report.disparity(*names) if cell["status"] == "ok" else None
-    out = {
-        "method": cell["method"],
-        "status": cell["status"],
-        "reason": _shown(cell.get("reason")),
-        "seed": cell["seed"] if cell["seeds"] > 1 else None,
-        "scores": [],
-        "disparity": None,
-        "error": None,
-    }
-    if disparity is None:
-        return out
-    disparity = disparity.astype(np.float32, copy=False)
-    out["disparity"] = figures.data_uri(coloring.disparity_colors(disparity, ends, figures.LEVELS))
-    truth = scene.truth.get(scene.ref)
-    if truth is not None:
-        out["error"] = figures.data_uri(coloring.error_colors(disparity, truth, scene.pair_steps, figures.LEVELS))
-    rows = report.results
-    rows = rows[
-        (rows["method"] == cell["method"])
-        & (rows["scene"] == cell["scene"])
-        & (rows["seed"] == cell["seed"])
-        & (rows["metric"] == METRIC)
-    ]
-    value = dict(zip(rows["region"], rows["value"], strict=True))
-    out["scores"] = [(region, tables.text(value.get(region, np.nan), "%")) for region in CAPTIONED]
-    return out
-
-
-def _methods(cells: pd.DataFrame) -> list[dict[str, str]]:
+def _methods(report: Report) -> list[dict[str, Any]]:
     """What was run: per method its parameters, cells and cost."""
     out = []
-    for method, rows in cells.groupby("method", sort=False):
+    for method, rows in report.cells.groupby("method", sort=False):
         ok = rows[rows["status"] == "ok"]
         peak = ok["peak_mb"].astype(float).max() if "peak_mb" in ok else np.nan
+        names = str(rows["algorithm"].iloc[0]), str(rows["params"].iloc[0])
         out.append(
             {
                 "method": str(method),
-                "algorithm": str(rows["algorithm"].iloc[0]),
-                "params": str(rows["params"].iloc[0]),
+                "algorithm": names[0],
+                "params": names[1],
+                "all": [(name, str(value)) for name, value in report.parameters.get(names, {}).items()],
                 "ok": f"{len(ok)} of {len(rows)}",
                 "seconds": tables.text(ok["seconds"].astype(float).sum(min_count=1), "s"),
                 "peak": "–" if pd.isna(peak) else f"{peak:.0f}",
@@ -283,13 +205,8 @@ def _methods(cells: pd.DataFrame) -> list[dict[str, str]]:
     return out
 
 
-def _shown(value: object) -> str:
-    return "" if value is None or value is pd.NA or value != value else str(value)
-
-
-def _dicts(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    return [{str(k): v for k, v in row.items()} for row in frame.to_dict("records")]
-
-
 def _records(frame: pd.DataFrame, columns: tuple[str, ...]) -> list[list[str]]:
-    return [[_shown(row.get(c)) for c in columns] for row in _dicts(frame)]
+    def shown(value: object) -> str:
+        return "" if value is None or value is pd.NA or value != value else str(value)
+
+    return [[shown(row.get(c)) for c in columns] for row in frame.to_dict("records")]

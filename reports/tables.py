@@ -121,6 +121,19 @@ def per_scene(results: pd.DataFrame, region: str, metric: str) -> pd.DataFrame:
     return means.reindex(index=scenes, columns=methods).rename_axis(index="scene", columns="method")
 
 
+def every_scene(results: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
+    """(metric, region) -> the table that `per_scene` makes, for all of them at once."""
+    scored = labelled(results)
+    keys = ["metric", "region", "scene", "method"]
+    groups = scored.assign(value=scored["value"].astype(float)).groupby(keys, sort=False)["value"]
+    wide = groups.mean().where(groups.count() == groups.size()).unstack("method")
+    scenes, methods = scored["scene"].unique(), scored["method"].unique()
+    return {
+        (str(metric), str(region)): part.droplevel(["metric", "region"]).reindex(index=scenes, columns=methods)
+        for (metric, region), part in wide.groupby(level=["metric", "region"], sort=False)
+    }
+
+
 def means(results: pd.DataFrame, scope: Shared, region: str, metric: str) -> pd.Series:
     """Method -> mean over the scenes it is counted on; NaN where one of them has no value.
 

@@ -2,12 +2,11 @@
 
 import re
 from html import unescape
-from itertools import pairwise
+from itertools import combinations
 
 import pandas as pd
 import pytest
 from attrs import evolve
-from matplotlib.text import Text
 
 from matbench.reports import curves, figures, page
 from matbench.reports.content import Report
@@ -88,9 +87,11 @@ def test_many_curves_have_names_that_do_not_touch() -> None:
     figure = curves.figure(evolve(sweep(), curves=_frame(rows)))
     assert figure is not None
     figure.draw_without_rendering()
-    boxes = sorted((Text.get_window_extent(text) for text in figure.axes[0].texts), key=lambda box: box.y0)
+    boxes = [text.get_window_extent() for text in figure.legends[0].get_texts()]
     assert len(boxes) == 7
-    assert all(above.y0 > below.y1 for below, above in pairwise(boxes))
+    assert not any(one.overlaps(other) for one, other in combinations([*boxes, figure.axes[0].bbox], 2))
+    styles = {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in figure.axes[0].get_lines()}
+    assert len(styles) == 7
 
 
 def test_the_terminal_has_the_same_numbers() -> None:
@@ -107,8 +108,7 @@ def test_the_terminal_has_the_same_numbers() -> None:
 def test_the_page_shows_figure_and_numbers_and_nothing_without_a_sweep(report: Report) -> None:
     assert 'id="curves"' not in page.render(report)
     html = page.render(evolve(report, sweeps=(sweep(), evolve(sweep(), option="n"))))
-    section = html.partition('<section id="curves"')[2].partition('<section id="maps"')[0]
-    assert '<a href="#curves">' in html
+    section = html.partition('<div id="curves"')[2].partition('<section id="run"')[0]
     assert "<b>&[" not in section
     words = re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", "", section)))
     assert "number of views, 0 to 4.5, scenes with size=half" in words

@@ -1,0 +1,92 @@
+"""Epipolar slices in the reference view's columns: how alike the views are, what a volume holds, what follows of it."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import cv2
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from matbench.drawing import as_bytes
+from matbench.scene import Scene
+from matbench.space import Volume, visibility
+from matbench.volumes import StoredVolume
+
+PLANES = 96
+"""Most planes of a slice of similarity."""
+
+SPREAD = 10.0  # grey levels of difference at which a similarity is exp(-1/2)
+_ROWS, _COLUMNS = 1, 2  # how far the window reaches up and down, left and right
+
+
+@frozen(eq=False)
+class Slice:
+    """One epipolar plane as a picture, the nearest disparity on top.
+
+    Parameters
+    ----------
+    values
+        (planes, W) uint8, 255 is 1; columns are the reference view's pixels.
+    ends
+        Disparities of its lower and upper edge, pixels per view step.
+    """
+
+    values: NDArray[np.uint8]
+    ends: tuple[float, float]
+
+
+def rows_of(scene: Scene, asked: Sequence[int]) -> list[int]:
+    """The rows that are shown: those asked for, the middle one, and a quarter above and below the middle."""
+    wanted = [min(row, scene.height - 1) for row in asked]
+    return list(dict.fromkeys([*wanted, scene.height // 2, scene.height // 4, 3 * scene.height // 4]))
+
+
+def similarity(scene: Scene, row: int) -> Slice:
+    """How alike neighbouring views are at each disparity of a row.
+
+    exp(-SSD / (2 `SPREAD`²)) with the mean squared difference of colours in a window of 3 rows and 5
+    columns, averaged over the pairs of neighbouring views that both have the point in their
+    frame; 0 where no pair has. It is made for looking at, and is no method's own similarity.
+    """
+    least, largest = scene.disparities.least, scene.disparities.largest
+    count = int(np.clip(np.ceil((largest - least) * scene.pair_steps) + 1, 2, PLANES))
+    planes = np.linspace(largest, least, count, dtype=np.float32)
+    columns = np.arange(scene.width, dtype=np.float32)
+    rows = slice(max(0, row - _ROWS), row + _ROWS + 1)
+    total, pairs = np.zeros((count, scene.width)), np.zeros((count, scene.width))
+    before: tuple[NDArray[Any], NDArray[Any]] | None = None
+    for view in range(scene.n):
+        places = columns - (view - scene.ref) * planes[:, None]
+        inside = (places >= 0) & (places <= scene.width - 1)
+        here = np.stack([_sampled(line, places) for line in scene.views[view, rows].astype(np.float32)]), inside
+        if before is not None:
+            square = np.mean((here[0] - before[0]) ** 2, axis=(0, 3))
+            both = inside & before[1]
+            total += both * np.exp(cv2.blur(square, (2 * _COLUMNS + 1, 1)) / (-2 * SPREAD**2))
+            pairs += both
+        before = here
+    half = (largest - least) / (count - 1) / 2 if largest > least else 0.5
+    return Slice(as_bytes(total / np.maximum(pairs, 1)), (least - half, largest + half))
+
+
+def _sampled(line: NDArray[np.float32], places: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(W, 3) colours of an image row at (planes, W) columns, linear between pixels -> (planes, W, 3)."""
+    sampled = cv2.remap(line[None], places, np.zeros_like(places), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(sampled, np.float32)
+
+
+def materiality(stored: StoredVolume, scene: Scene, row: int) -> tuple[Slice, Slice] | None:
+    """A row of a volume, and the share of its views that see each point past what is nearer (equation 3).
+
+    None where the volume does not span the reference view or the row.
+    """
+    if scene.ref not in stored.views or not 0 <= row < stored.space.rows or stored.space.width != scene.width:
+        return None
+    space, ref = evolve(stored.space, rows=1), stored.views.index(scene.ref)
+    volume = Volume(space, stored.levels[row : row + 1] * np.float32(1 / 255), stored.views)
+    seen = np.mean([visibility(volume, view) for view in range(space.views)], axis=0)
+    step = (stored.views[1] - stored.views[0]) * space.fineness  # samples to a pixel per view step of the scene
+    ends = (space.first - 0.5) / step, (space.last + 0.5) / step
+    material, sight = (space.in_view(v, ref)[0, ::-1].astype(np.float32) for v in (volume.values, seen))
+    return Slice(as_bytes(material), ends), Slice(as_bytes(sight), ends)

@@ -1,0 +1,131 @@
+"""How errors are spread: over thresholds, and over how many of the views see a pixel."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from attrs import frozen
+from numpy.typing import NDArray
+
+from matbench.metrics import TIE, error_map
+from matbench.regions import seen_from
+from matbench.reports import figures
+from matbench.reports.tables import REGIONS, Shared
+from matbench.scene import Scene
+from matbench.spec import read_scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+THRESHOLDS = np.arange(0, 8.01, 0.25)
+"""Px of the pair."""
+
+WRONG = 1.0  # px of the pair: errors by the number of views are those of total_bad_1
+LEAST_PIXELS = 50  # fewer make no share
+
+Counts = NDArray[np.intp]
+
+
+def views_seeing(scene: Scene) -> Counts | None:
+    """(H, W) how many views see the reference view's points, itself counted; 0 where truth is unknown.
+
+    As for the regions over all views: exact where the scene knows it, else from the truth.
+    """
+    truth = scene.truth.get(scene.ref)
+    if truth is None:
+        return None
+    exact = scene.visible.get(scene.ref)
+    others = [view for view in range(scene.n) if view != scene.ref]
+    seen = [seen_from(truth, view - scene.ref) if exact is None else exact[view] for view in others]
+    count: Counts = np.where(np.isfinite(truth), 1 + np.sum(seen, axis=0), 0)
+    return count
+
+
+@frozen(eq=False)
+class Spread:
+    """Where the errors of one map on one scene are.
+
+    Parameters
+    ----------
+    above
+        Region -> (thresholds,) per cent of its pixels not answered, or with an error above each.
+    by_views
+        Number of views that see a pixel -> per cent of those pixels not answered or more than `WRONG` off.
+    views
+        How many views the scene has.
+    """
+
+    above: Mapping[str, NDArray[np.float64]]
+    by_views: Mapping[int, float]
+    views: int
+
+
+def spread(estimate: NDArray[np.float32], scene: Scene, seeing: Counts) -> Spread:
+    """Measure one map of the reference view.
+
+    Parameters
+    ----------
+    seeing
+        Of `views_seeing`.
+    """
+    truth = scene.truth[scene.ref]
+    error = np.nan_to_num(error_map(estimate, truth, scene.pair_steps), nan=np.inf)
+    known, above = np.isfinite(truth), {}
+    for region, mask in scene.scored_regions.items():
+        errors = np.sort(error[mask & known])
+        if errors.size:
+            above[region] = 100 * (1 - np.searchsorted(errors, THRESHOLDS + TIE, side="right") / errors.size)
+    pixels = np.bincount(seeing[known], minlength=scene.n + 1)
+    wrong = np.bincount(seeing[known & (error > WRONG + TIE)], minlength=scene.n + 1)
+    by_views = {k: float(100 * wrong[k] / pixels[k]) for k in range(1, scene.n + 1) if pixels[k] >= LEAST_PIXELS}
+    return Spread(above, by_views, scene.n)
+
+
+Spreads = Mapping[tuple[str, str], Spread]
+"""Of each method on each scene."""
+
+
+def _mean(parts: Sequence[tuple[str, NDArray[np.float64]]]) -> NDArray[np.float64]:
+    """The mean over scenes, one with different options being one scene."""
+    names = [read_scene(name).name for name, _ in parts]
+    rows = pd.DataFrame([values for _, values in parts]).groupby(names).mean()
+    return np.asarray(rows.mean(), np.float64)
+
+
+def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
+    """A panel for each region: share of pixels with an error above each threshold, a curve for each ranked method."""
+    measured = {region for part in spreads.values() for region in part.above}
+    found = [region for region in REGIONS if region in measured]
+    methods = [m for m in scope.methods if scope.is_ranked(m)]
+    panels = []
+    for region in found:
+        curves = {}
+        for method in methods:
+            here = [(s, spreads[method, s]) for s in scope.scenes if (method, s) in spreads]
+            parts = [(s, part.above[region]) for s, part in here if region in part.above]
+            if parts:
+                curves[method] = (THRESHOLDS, _mean(parts))
+        panels.append((region, curves))
+    return figures.panels(panels, "threshold, px of the pair", "pixels above it, %", every=6)
+
+
+def by_views(spreads: Spreads, scope: Shared) -> "tuple[Figure | None, list[str]]":
+    """A panel for each number of views: total_bad_1 against how many of them see a pixel; and what to beware of."""
+    methods = [m for m in scope.methods if scope.is_ranked(m)]
+    shared = {s: part for (_, s), part in spreads.items() if s in scope.scenes}
+    panels, said = [], []
+    for count in sorted({part.views for part in shared.values()}):
+        scenes = [s for s, part in shared.items() if part.views == count]
+        places = sorted({k for s in scenes for k in shared[s].by_views})
+        curves = {}
+        for method in methods:
+            rows = [
+                _mean([(s, np.array([spreads[method, s].by_views[k]])) for s in scenes if k in shared[s].by_views])
+                for k in places
+            ]
+            curves[method] = (np.array(places, float), np.concatenate(rows))
+        panels.append((f"{count} views, {len(scenes)} scene{'s' if len(scenes) != 1 else ''}", curves))
+        partly = [k for k in places if sum(k in shared[s].by_views for s in scenes) < len(scenes)]
+        said += [f"{count} views: not every scene has pixels seen by {', '.join(map(str, partly))}."] if partly else []
+    return figures.panels(panels, "views that see the pixel", "total_bad_1, %", backwards=True), said

@@ -1,0 +1,280 @@
+"""All numbers that the page lets one choose: the same tables as everywhere, for every metric and region."""
+
+import re
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from attrs import frozen
+
+from matbench.reports import standing, tables
+from matbench.reports.content import Report
+from matbench.reports.standing import Difference
+from matbench.reports.tables import METRIC, REGION, Shared
+from matbench.statistics import Effect
+
+THRESHOLD = re.compile(r"(bad|total_bad)_(\d+(?:\.\d+)?)")
+"""Metrics that are one number at several thresholds."""
+
+AT = "@"  # stands for the threshold in a family's name
+
+_FIRST = ("total_bad_@", "bad_@", "invalid", "avg", "rms")
+
+COSTS = {"seconds": ("s", "time"), "peak_mb": ("MiB", "memory")}
+"""Column of the cells -> unit, and what it is called."""
+
+Entry = list[Any]
+"""[number or None, as shown, place]: what a cell of a table needs, in the template and in the script."""
+
+
+def incomparable(cells: pd.DataFrame) -> str:
+    """Why the times of a run must not be ranked, in words; empty if nothing speaks against it."""
+    good = cells[cells["status"] == "ok"]
+    if "machine" in good and good["machine"].dropna().nunique() > 1:
+        return f"cells ran on {good['machine'].dropna().nunique()} machines"
+    if "alone" in good and (good["alone"].astype(str).str.lower() == "false").any():
+        return "some cells ran while others did"
+    return ""
+
+
+@frozen(eq=False)
+class Numbers:
+    """Every table of a run, from which template and script take theirs.
+
+    Parameters
+    ----------
+    scope
+        Its methods in the order in which they are shown.
+    """
+
+    report: Report
+    scope: Shared
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        return tables.metrics(self.report.results)
+
+    @cached_property
+    def regions(self) -> list[str]:
+        return tables.regions(self.report.results)
+
+    @property
+    def metric(self) -> str:
+        """What is shown first."""
+        return METRIC if METRIC in self.units or not self.units else next(iter(self.units))
+
+    @property
+    def region(self) -> str:
+        return REGION if REGION in self.regions or not self.regions else self.regions[0]
+
+    @cached_property
+    def thresholds(self) -> list[str]:
+        """Of the metrics that have some, as they stand in the names, increasing."""
+        found = {hit[2] for name in self.units if (hit := THRESHOLD.fullmatch(name))}
+        return sorted(found, key=float)
+
+    @cached_property
+    def scores(self) -> list[str]:
+        """The metrics, those of several thresholds once, total_bad before bad, as ``total_bad_@``."""
+        names = [THRESHOLD.sub(rf"\1_{AT}", name) for name in self.units]
+        first = [f"{family}_{AT}" for family in ("total_bad", "bad") if f"{family}_{AT}" in names]
+        return list(dict.fromkeys(first + names))
+
+    @cached_property
+    def columns(self) -> list[str]:
+        """Of the first table: the scores most looked at, then the costs, then all other scores."""
+        first = [s for s in self.scores if s in _FIRST]
+        return [*first, *self.costs, *(s for s in self.scores if s not in first)]
+
+    def score(self, metric: str) -> str:
+        """The score that a metric belongs to.
+
+        ``total_bad_1`` belongs to ``total_bad_@``.
+        """
+        return THRESHOLD.sub(rf"\1_{AT}", metric)
+
+    @property
+    def threshold(self) -> str:
+        hit = THRESHOLD.fullmatch(self.metric)
+        return hit[2] if hit else (self.thresholds or [""])[0]
+
+    def metric_of(self, score: str) -> str:
+        """The metric of a score at the first threshold."""
+        return score.replace(AT, self.threshold)
+
+    def is_higher(self, metric: str) -> bool:
+        return metric in self.report.higher
+
+    @cached_property
+    def _tables(self) -> Mapping[tuple[str, str], pd.DataFrame]:
+        """(metric, region) -> scenes x methods."""
+        found = tables.every_scene(self.report.results)
+        scenes, methods = list(self.scope.asked), list(self.scope.methods)
+        nothing = pd.DataFrame(np.nan, index=scenes, columns=methods)
+        both = [(m, r) for m in self.units for r in self.regions]
+        return {one: found.get(one, nothing).reindex(index=scenes, columns=methods) for one in both}
+
+    @cached_property
+    def _ranked(self) -> pd.Series:
+        return pd.Series({m: self.scope.is_ranked(m) for m in self.scope.methods}, dtype=bool)
+
+    def _by_metric(self, make: Any) -> dict[str, dict[str, Any]]:
+        return {m: {r: make(m, self._tables[m, r]) for r in self.regions} for m in self.units}
+
+    @cached_property
+    def means(self) -> dict[str, dict[str, dict[str, Entry]]]:
+        """Metric -> region -> method -> entry."""
+
+        def make(metric: str, table: pd.DataFrame) -> dict[str, Entry]:
+            means = tables.over_scenes(table, self.scope)
+            return entries(means, self._ranked, self.units[metric], self.is_higher(metric))
+
+        return self._by_metric(make)
+
+    @cached_property
+    def ranks(self) -> dict[str, dict[str, dict[str, Entry]]]:
+        """Metric -> region -> method -> entry with its mean rank."""
+
+        def make(metric: str, table: pd.DataFrame) -> dict[str, Entry]:
+            ranks = standing.mean_ranks(table, self.scope, self.units[metric], self.is_higher(metric))
+            return entries(pd.Series(ranks, dtype=float), self._ranked, "%", higher=False)
+
+        return self._by_metric(make)
+
+    @cached_property
+    def scenes(self) -> dict[str, dict[str, list[list[Entry]]]]:
+        """Metric -> region -> scenes x methods of entries; the status stands where a cell did not end well."""
+        bad = self.report.cells[self.report.cells["status"] != "ok"]
+        status = {(m, s): state for m, s, state in zip(bad["method"], bad["scene"], bad["status"], strict=True)}
+        has = {
+            s: pd.Series({m: s in self.scope.has[m] for m in self.scope.methods}, dtype=bool) for s in self.scope.asked
+        }
+
+        def make(metric: str, table: pd.DataFrame) -> list[list[Entry]]:
+            out = []
+            for scene, row in table.iterrows():
+                here = has[str(scene)]
+                found = entries(row.where(here), here, self.units[metric], self.is_higher(metric))
+                found |= {m: [None, str(status[m, scene]), 0] for m in self.scope.methods if (m, scene) in status}
+                out.append([found[m] for m in self.scope.methods])
+            return out
+
+        return self._by_metric(make)
+
+    @cached_property
+    def differences(self) -> dict[str, dict[str, list[Difference]]]:
+        """Metric -> region -> differences between the ranked methods."""
+        found = iter(standing.differences(list(self._tables.values()), self.scope))
+        return self._by_metric(lambda *_: next(found))
+
+    @cached_property
+    def costs(self) -> dict[str, dict[str, Entry]]:
+        """What it cost, by name of the column of the cells; times are marked only where they are comparable."""
+        scope, out = self.scope, {}
+        good = self.report.cells[self.report.cells["status"] == "ok"]
+        for name, (unit, _) in COSTS.items():
+            if name not in good:
+                continue
+            values = good.assign(value=good[name].astype(float))
+            wide = values.groupby(["scene", "method"])["value"].mean().unstack("method")
+            wide = wide.reindex(index=list(scope.asked), columns=list(scope.methods))
+            # the memory that a machine must have is that of the hungriest scene
+            over = {
+                m: wide.loc[list(scope.counted(m)), m].agg("max" if name == "peak_mb" else "mean", skipna=False)
+                for m in scope.methods
+            }
+            compared = self._ranked & (name != "seconds" or not incomparable(self.report.cells))
+            out[name] = entries(pd.Series(over, dtype=float), compared, unit, higher=False)
+        return out
+
+    def against(self, metric: str, region: str, reference: str | None = None) -> list[dict[str, Any]]:
+        """How far each ranked method is from a reference, by default the best: a table's lines, as the script's."""
+        found = self.differences[metric][region] if self.units else []
+        means = self.means[metric][region] if self.units else {}
+        known = standing.references(self.scope)
+        if reference is None:
+            values = {m: means[m][0] for m in known if means[m][0] is not None}
+            reference = min(values, key=lambda m: -values[m] if self.is_higher(metric) else values[m], default=None)
+        effects = {d.method: d.effect for d in found if d.reference == reference}
+        effects |= {d.reference: turned(d.effect) for d in found if d.method == reference}
+        parts = [v for effect in effects.values() for v in _ends(effect)]
+        left, right = min(0.0, *parts, 0.0), max(0.0, *parts, 0.0)
+        width = right - left or 1.0
+        return [
+            {
+                "method": method,
+                "reference": reference,
+                "mean": signed(effect.mean),
+                "interval": f"{signed(effect.low)} .. {signed(effect.high)}" if np.isfinite(effect.low) else "–",
+                "size": signed(effect.size, 1),
+                "scenes": effect.scenes,
+                "verdict": words(effect.verdict, self.is_higher(metric)),
+                "bar": [round(3 + 94 * (v - left) / width, 2) for v in (*_ends(effect), 0.0)],
+            }
+            for method, effect in ((m, effects[m]) for m in self.scope.methods if m in effects)
+        ]
+
+    def data(self) -> dict[str, Any]:
+        """What the script needs of all this; NaN is None."""
+        place = {m: i for i, m in enumerate(self.scope.methods)}
+        return {
+            "methods": list(self.scope.methods),
+            "asked": list(self.scope.asked),
+            "regions": self.regions,
+            "units": self.units,
+            "higher": [m for m in self.units if self.is_higher(m)],
+            "means": self.means,
+            "ranks": self.ranks,
+            "scenes": self.scenes,
+            "references": standing.references(self.scope),
+            "differences": {
+                m: {
+                    r: [[place[d.method], place[d.reference], *_numbers(d.effect)] for d in found]
+                    for r, found in by_region.items()
+                }
+                for m, by_region in self.differences.items()
+            },
+        }
+
+
+def entries(values: pd.Series, ranked: pd.Series, unit: str, higher: bool) -> dict[str, Entry]:
+    """Method -> entry."""
+    marks = tables.places(values[ranked], unit, higher)
+    return {
+        str(m): [None if pd.isna(v) else float(f"{v:.8g}"), tables.text(v, unit), int(marks.get(m, 0))]
+        for m, v in values.items()
+    }
+
+
+def signed(value: float, digits: int = 2) -> str:
+    """A difference, as shown."""
+    return f"{value:+.{digits}f}" if np.isfinite(value) else "–"
+
+
+def words(verdict: str, higher: bool) -> str:
+    """A verdict as better or worse.
+
+    >>> words("lower", higher=False), words("lower", higher=True), words("undecided", higher=True)
+    ('better', 'worse', 'undecided')
+    """
+    if verdict not in ("lower", "higher"):
+        return verdict
+    return "better" if (verdict == "higher") == higher else "worse"
+
+
+def turned(effect: Effect) -> Effect:
+    """The other way round."""
+    return Effect(-effect.mean, -effect.high, -effect.low, -effect.size, effect.scenes)
+
+
+def _ends(effect: Effect) -> tuple[float, float, float]:
+    mean = effect.mean if np.isfinite(effect.mean) else 0.0
+    low, high = (v if np.isfinite(v) else mean for v in (effect.low, effect.high))
+    return low, mean, high
+
+
+def _numbers(effect: Effect) -> list[float | int | None]:
+    found = (effect.mean, effect.low, effect.high, effect.size)
+    return [*(float(f"{v:.6g}") if np.isfinite(v) else None for v in found), effect.scenes]

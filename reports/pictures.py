@@ -1,0 +1,148 @@
+"""What the page shows of every scene: maps from which a browser draws all pictures, slices, spreads of errors."""
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from attrs import frozen
+
+from matbench import coloring
+from matbench.reports import epipolar, errors
+from matbench.reports.content import Report
+from matbench.reports.encoding import Coding, exact, photograph, side_for, size_within
+from matbench.reports.tables import Shared
+from matbench.scene import Scene
+
+_BESIDES = 4  # pictures of a scene besides its methods': the truth, the view, slices
+
+
+@frozen(eq=False)
+class Gallery:
+    """Scene by scene what is shown, for the template and, as JSON, for the script.
+
+    Parameters
+    ----------
+    scenes
+        For the template; in the order of `Shared.asked`, those without images too.
+    codings
+        For the script, one for each scene: how its maps are read, or None.
+    slices
+        For the script, one for each scene: rows, each with its slices.
+    spreads
+        Of each method on each scene.
+    """
+
+    scenes: list[dict[str, Any]]
+    codings: list[dict[str, Any] | None]
+    slices: list[list[dict[str, Any]]]
+    spreads: errors.Spreads
+
+
+def gallery(report: Report, scope: Shared) -> Gallery:
+    """Read every map once, and every volume that was kept."""
+    side = side_for((len(scope.methods) + _BESIDES) * len(scope.asked))
+    out = Gallery([], [], [], {})
+    spreads: dict[tuple[str, str], errors.Spread] = {}
+    for name in scope.asked:
+        cells = sorted(_first_seeds(report.cells, name), key=lambda c: scope.methods.index(c["method"]))
+        scene = report.scenes.get(name)
+        if scene is None:
+            out.scenes.append({"name": name, "known": False})
+            out.codings.append(None)
+            out.slices.append([])
+            continue
+        coding, seeing = Coding.of(scene), errors.views_seeing(scene)
+
+        def shown(
+            cell: dict[str, Any], scene: Scene = scene, coding: Coding = coding, seeing: Any = seeing
+        ) -> dict[str, Any]:
+            return _map(report, scene, cell, coding, side, seeing)
+
+        with ThreadPoolExecutor() as pool:  # the encoder lets go of the interpreter
+            maps = list(pool.map(shown, cells))
+        for cell in maps:
+            if (part := cell.pop("spread")) is not None:
+                spreads[cell["method"], name] = part
+        truth = scene.truth.get(scene.ref)
+        low, high = coloring.disparity_ends(scene)
+        out.scenes.append(
+            {
+                "name": name,
+                "known": True,
+                "views": scene.n,
+                "ref": scene.labels[scene.ref],
+                "size": (scene.width, scene.height),
+                "shown": size_within(scene.height, scene.width, side)[::-1],
+                "pair_steps": f"{scene.pair_steps:g}",
+                "scale": [f"{v:.3g}" for v in (low, (low + high) / 2, high)],
+                "view": photograph(scene.views[scene.ref], side),
+                "truth": None if truth is None else coding.encode(truth, scene.pair_steps, side),
+                "methods": maps,
+            }
+        )
+        out.codings.append(
+            {
+                "low": coding.low,
+                "step": coding.step,
+                "gain": coding.gain,
+                "pair": scene.pair_steps,
+                "ends": [low * scene.pair_steps, high * scene.pair_steps],
+                "size": [scene.width, scene.height],
+            }
+        )
+        out.slices.append(_slices(report, scene, cells, side))
+    return Gallery(out.scenes, out.codings, out.slices, spreads)
+
+
+def _first_seeds(cells: pd.DataFrame, scene: str) -> list[dict[str, Any]]:
+    """One cell for each method on a scene: its first that is ok, else its first."""
+    here = cells[cells["scene"] == scene].assign(bad=lambda c: c["status"] != "ok")
+    first = here.sort_values("bad", kind="stable").drop_duplicates("method").sort_index()
+    seeds = here.groupby("method").size()
+    rows = [{str(k): v for k, v in row.items()} for row in first.to_dict("records")]
+    return [{**row, "seeds": int(seeds[row["method"]])} for row in rows]
+
+
+def _names(cell: dict[str, Any]) -> tuple[str, str, str, int]:
+    return str(cell["algorithm"]), str(cell["params"]), str(cell["scene"]), int(cell["seed"])
+
+
+def _map(
+    report: Report, scene: Scene, cell: dict[str, Any], coding: Coding, side: int, seeing: errors.Counts | None
+) -> dict[str, Any]:
+    disparity = report.disparity(*_names(cell)) if cell["status"] == "ok" else None
+    reason = cell.get("reason")
+    out = {
+        "method": cell["method"],
+        "status": cell["status"],
+        "reason": "" if reason is None or reason is pd.NA or reason != reason else str(reason),
+        "seed": cell["seed"] if cell["seeds"] > 1 else None,
+        "map": None,
+        "spread": None,
+    }
+    if disparity is not None:
+        disparity = disparity.astype(np.float32, copy=False)
+        out["map"] = coding.encode(disparity, scene.pair_steps, side)
+        out["spread"] = None if seeing is None else errors.spread(disparity, scene, seeing)
+    return out
+
+
+def _slices(report: Report, scene: Scene, cells: list[dict[str, Any]], side: int) -> list[dict[str, Any]]:
+    """Row by row: the similarity of the views and, of every method with a volume, materiality and visibility."""
+    rows = epipolar.rows_of(scene, report.rows)
+    out: list[dict[str, Any]] = [
+        {"row": row, "similarity": _picture(epipolar.similarity(scene, row), side), "methods": {}} for row in rows
+    ]
+    for cell in cells:
+        volume = report.volumes(*_names(cell)) if cell["status"] == "ok" else None
+        for row, part in zip(rows, out, strict=True):
+            found = None if volume is None else epipolar.materiality(volume, scene, row)
+            if found is not None:
+                part["methods"][cell["method"]] = [_picture(one, side) for one in found]
+    return out
+
+
+def _picture(one: epipolar.Slice, side: int) -> dict[str, Any]:
+    thin = one.values[:, :: -(-one.values.shape[1] // side)]
+    return {"src": exact(np.ascontiguousarray(thin)), "ends": [round(end, 4) for end in one.ends]}

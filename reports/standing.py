@@ -1,0 +1,79 @@
+"""Who is ahead of whom, and whether that is real: mean ranks and paired differences over scenes."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from attrs import frozen
+
+from matbench.reports.tables import Shared, text
+from matbench.spec import read_scene
+from matbench.statistics import Effect, paired_effects
+
+REFERENCES = 12
+"""Methods that all others are compared with, the best by the summary: pairs grow with the square."""
+
+
+def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
+    """The shared scenes x the ranked methods: what means, ranks and differences are over.
+
+    Parameters
+    ----------
+    table
+        Scenes x methods, as `matbench.reports.tables.per_scene` makes it.
+
+    Returns
+    -------
+    One row a distinct scene: one scene with different options is one witness, its values are
+    averaged. Scenes in which the region is empty, so that no method has a value, are left out.
+    """
+    ranked = [m for m in scope.methods if scope.is_ranked(m)]
+    chosen = table.reindex(index=list(scope.scenes), columns=ranked).dropna(how="all")
+    names = [read_scene(str(scene)).name for scene in chosen.index]
+    if len(set(names)) == len(names):
+        return chosen
+    groups = chosen.groupby(names, sort=False)
+    return groups.mean().where(groups.count().eq(groups.size(), axis=0))
+
+
+def mean_ranks(table: pd.DataFrame, scope: Shared, unit: str, higher: bool) -> dict[str, float]:
+    """Method -> its rank, 1 the best, averaged over `witnesses`; ranks go by what is shown, ties share theirs.
+
+    NaN for a method that is not ranked, or lacks a value.
+    """
+    rows = witnesses(table, scope)
+    shown = rows.map(lambda value: float(text(value, unit)) if pd.notna(value) else np.nan)
+    means = shown.rank(axis=1, ascending=not higher).mean(skipna=False)
+    return {m: float(means.get(m, np.nan)) for m in scope.methods}
+
+
+@frozen
+class Difference:
+    """How far a method is from another, as `matbench.statistics.Effect` of their differences."""
+
+    method: str
+    reference: str
+    effect: Effect
+
+
+def references(scope: Shared) -> list[str]:
+    """The methods that others can be compared with: the first `REFERENCES` ranked ones."""
+    return [m for m in scope.methods if scope.is_ranked(m)][:REFERENCES]
+
+
+def differences(tables: Sequence[pd.DataFrame], scope: Shared) -> list[list[Difference]]:
+    """Table by table, every ranked method minus every reference that stands before it.
+
+    Parameters
+    ----------
+    tables
+        Scenes x methods of one metric in one region each.
+    """
+    known = references(scope)
+    ranked = [m for m in scope.methods if scope.is_ranked(m)]
+    pairs = [(b, a) for a, b in combinations(ranked, 2) if a in known]
+    rows = [witnesses(table, scope) for table in tables]
+    values = [(part[b] - part[a]).to_numpy(float) if len(part) else np.empty(0) for part in rows for b, a in pairs]
+    effects = iter(paired_effects(values))
+    return [[Difference(b, a, next(effects)) for b, a in pairs] for _ in tables]
