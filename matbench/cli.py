@@ -293,6 +293,7 @@ def view(
     return DONE
 
 
+app.command("matbench.commands.bench:app", name="bench", help="Measure speed: against stored ratios, or a commit.")
 app.command("matbench.commands.check:app", name="check", help="Try methods: do they keep to what is asked of them?")
 app.command("matbench.commands.fetch:app", name="fetch", help="Download scenes, check them, and put them in place.")
 app.command("matbench.commands.scene:app", name="scene", help="Look at scenes, check them, and make your own.")
