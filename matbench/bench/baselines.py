@@ -1,7 +1,7 @@
 """Stored ratios of a kind of machine, and when a measured one is a regression."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Literal
@@ -130,28 +130,28 @@ def matching(stored: Sequence[Baseline], kind: Mapping[str, str], reference: str
 
 
 def judge(
-    tree: Tree,
     names: Sequence[str],
     stored: Baseline | None,
     first: Sitting,
+    again: Callable[[Sequence[str]], Sitting],
     margin: float = MARGIN,
-    rounds: int = ROUNDS,
-    progress: Progress = lambda _: None,
 ) -> list[Judged]:
     """Compare a sitting with the stored ratios; what looks slow is measured again in fresh processes.
 
     One process may be unlucky from beginning to end: where its memory lies, who its neighbours are.
     So a subject whose first ratio is beyond half of the margin sits again until there are `SITTINGS`,
     and it is slower if their median is beyond the margin: if most of them agree.
+
+    Parameters
+    ----------
+    again
+        Measures some subjects in a fresh process.
     """
     ratios = {name: [timing.ratio] for name, timing in first.timings.items()}
     known = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
     suspects = [n for n, ratio in known.items() if n in ratios and ratios[n][0] > ratio * (1 + margin / 2)]
-    for number in range(2, SITTINGS + 1):
-        if not suspects:
-            break
-        progress(f"again ({number} of {SITTINGS}): {', '.join(suspects)}")
-        for name, timing in sit(tree, suspects, 2 * rounds).timings.items():
+    for _ in range(SITTINGS - 1 if suspects else 0):
+        for name, timing in again(suspects).timings.items():
             ratios[name].append(timing.ratio)
     return [_judged(name, first, ratios.get(name, []), known.get(name), margin) for name in names]
 

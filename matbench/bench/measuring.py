@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -11,13 +12,15 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from attrs import frozen
 
 from matbench.errors import UserError, unknown
 from matbench.plugins import kernel_cache
+from matbench.statistics import median_interval
 
 BENCHMARKS = Path("tests", "benchmarks")
-ROUNDS = 25
+ROUNDS, PARTS = 25, 3
 _LARGEST = str(2**30)  # bytes that malloc keeps rather than giving back: pages come new once, not in every round
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -127,10 +130,8 @@ def subjects(tree: Tree, patterns: Sequence[str] = ()) -> list[str]:
     UserError
         If a pattern means none of them.
     """
-    listed = _pytest(tree, tree.code, "--collect-only")
-    names = [line.partition("[")[2].removesuffix("]") for line in listed.stdout.splitlines() if "::" in line]
-    if not names:
-        raise UserError(f"{tree.code / BENCHMARKS} cannot be run: {_last_line(listed)}")
+    listed = runpy.run_path(str(tree.code / BENCHMARKS / "subjects.py"))
+    names = [*listed["METHODS"], *listed["KERNELS"]]
     chosen: dict[str, None] = {}
     for pattern in patterns:
         meant = [name for name in names if pattern == name or fnmatchcase(name, pattern)]
@@ -158,7 +159,8 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, tests: Path | No
         done = _pytest(
             tree,
             tests or tree.code,
-            f"--benchmark-min-rounds={rounds}",
+            f"--benchmark-min-rounds={-(-rounds // PARTS)}",
+            f"--parts={PARTS}",
             f"--benchmark-json={written}",
             *(f"--subject={name}" for name in names),
         )
@@ -169,15 +171,20 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, tests: Path | No
             raise UserError(f"nothing was measured in {tree.code}: {_last_line(done)}") from None
     if Path(measured["code"]) != tree.code.resolve():
         raise UserError(f"{measured['code']} was measured instead of {tree.code}: is another matbench before it?")
-    timings = {
-        one["params"]["name"]: Timing(
-            **{key: one["extra_info"][key] for key in ("ratio", "low", "high", "seconds", "rounds")}, group=one["group"]
-        )
-        for one in found["benchmarks"]
-        if "ratio" in one["extra_info"]
-    }
+    parts: dict[str, list[Any]] = {}
+    for one in found["benchmarks"]:
+        if one["extra_info"].get("ratios"):
+            parts.setdefault(one["params"]["name"], []).append(one)
+    timings = {name: _timing(of_name) for name, of_name in parts.items()}
     missing = {name: "not measured" for name in names if name not in timings}
     return Sitting(timings, {**missing, **measured["failed"]}, measured["reference"])
+
+
+def _timing(parts: Sequence[Any]) -> Timing:
+    """All rounds of a subject together."""
+    ratios = np.concatenate([part["extra_info"]["ratios"] for part in parts])
+    seconds = float(np.median([part["extra_info"]["seconds"] for part in parts]))
+    return Timing(*median_interval(ratios), seconds, parts[0]["group"], ratios.size)
 
 
 def run_program(tree: Tree, name: str) -> Any:

@@ -13,6 +13,12 @@ _failed: dict[str, str] = {}
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--subject", action="append", default=[], help="Time this one only; may be repeated.")
+    parser.addoption("--parts", type=int, default=1, help="Time all subjects, and all again, so many times.")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if "part" in metafunc.fixturenames:
+        metafunc.parametrize("part", range(metafunc.config.getoption("--parts", 1)))
 
 
 def _subject(item: Any) -> str | None:
@@ -20,10 +26,16 @@ def _subject(item: Any) -> str | None:
     return None if call is None else call.params.get("name")
 
 
+def _part(item: Any) -> int:
+    call = getattr(item, "callspec", None)
+    return 0 if call is None else int(call.params.get("part", 0))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     wanted = config.getoption("--subject", [])
     if wanted:
         items[:] = [item for item in items if _subject(item) in wanted]
+    items.sort(key=_part)
 
 
 @pytest.hookimpl(wrapper=True)

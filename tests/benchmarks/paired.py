@@ -9,13 +9,10 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 from reference import Reference
-from scipy.stats import binom
 
 SLICE = 0.004  # seconds that a subject takes at least in a round: long for the timer, short for most disturbances
-CONFIDENCE = 0.95
 
 Work = Callable[[], object]
 
@@ -33,18 +30,8 @@ def calls_in(work: Work, seconds: float) -> int:
     return max(1, round(seconds / max(min(timed(work, 1) for _ in range(3)), 1e-6)))
 
 
-def median_interval(values: NDArray[np.float64]) -> tuple[float, float, float]:
-    """The median and the order statistics around it that hold the true one with `CONFIDENCE` or more.
-
-    Whatever the distribution, the number of values below its median is binomial.
-    """
-    ordered = np.sort(values)
-    below = max(0, int(binom.ppf((1 - CONFIDENCE) / 2, ordered.size, 0.5)) - 1)
-    return float(np.median(ordered)), float(ordered[below]), float(ordered[-1 - below])
-
-
 def measure(benchmark: BenchmarkFixture, work: Work, reference: Reference, rounds: int) -> None:
-    """Benchmark a subject; the ratio, its interval and what it was measured with go to ``extra_info``."""
+    """Benchmark a subject; the ratio of every round and what it was measured with go to ``extra_info``."""
     work()  # compiled, and its memory touched
     reference()
     calls = calls_in(work, SLICE)
@@ -53,13 +40,17 @@ def measure(benchmark: BenchmarkFixture, work: Work, reference: Reference, round
     before: list[float] = []
     after: list[float] = []
 
+    def reference_before() -> None:
+        reference()  # back into the caches, should another program have had them
+        before.append(timed(reference, around))
+
     def subject() -> None:
         for _ in range(calls):
             work()
 
     benchmark.pedantic(
         subject,
-        setup=lambda: before.append(timed(reference, around)),
+        setup=reference_before,
         teardown=lambda: after.append(timed(reference, around)),
         rounds=rounds,
     )
@@ -67,13 +58,10 @@ def measure(benchmark: BenchmarkFixture, work: Work, reference: Reference, round
         return
     taken = np.array(benchmark.stats.stats.data) / calls
     per_reference = (np.array(before) + np.array(after)) / (2 * around)
-    ratio, low, high = median_interval(taken / per_reference)
     benchmark.extra_info.update(
-        ratio=ratio,
-        low=low,
-        high=high,
+        ratios=(taken / per_reference).tolist(),
         seconds=float(np.median(taken)),
         reference_seconds=float(np.median(per_reference)),
         calls=calls,
-        rounds=rounds,
+        reference_calls=around,
     )

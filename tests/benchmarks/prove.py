@@ -6,7 +6,8 @@
 The checkout is copied, and ratios are stored from the copy. Then, in turns: the unchanged copy is measured
 with all subjects, and any alarm is a false one; and copies in whose source a kernel does 30 % more of its
 own work are measured, which must be caught. With ``--load``, meanwhile one process per core streams
-memory; ratios are stored before the load begins, as they are in life. The last line is JSON.
+memory; ratios are stored before the load begins, as they are in life. The last line is JSON. With
+``--folder DIR`` copies and ratios stay there, and a second call (with ``--load``, say) is judged by the same.
 """
 
 import argparse
@@ -102,7 +103,9 @@ PLANTS = (
 
 
 def copy_checkout(to: Path, plant: Plant | None = None) -> Path:
-    """A copy of the code and its benchmarks; planted if told so."""
+    """A copy of the code and its benchmarks; planted if told so. One that is there already stays as it is."""
+    if to.is_dir():
+        return to
     hidden = shutil.ignore_patterns("__pycache__", ".*", "runs")
     for name in FOLDERS:
         shutil.copytree(HERE / name, to / name, symlinks=True, ignore=hidden)
@@ -164,6 +167,7 @@ def main() -> None:
     parser.add_argument("--tries", type=int, default=20, help="of either kind")
     parser.add_argument("--load", action="store_true", help="with other work on every core")
     parser.add_argument("--only", choices=("caught", "alarms"), help="one of the two counts")
+    parser.add_argument("--folder", type=Path, help="keep copies and ratios there; default: nothing is kept")
     parser.add_argument("--margin", default="0.15")
     asked = parser.parse_args()
     if asked.tries < 1:
@@ -172,12 +176,15 @@ def main() -> None:
     catches: list[dict[str, Any]] = []
     alarms: list[dict[str, float]] = []
     worst: list[float] = []
-    with tempfile.TemporaryDirectory(prefix="matbench-proof-") as folder:
-        place, cache = Path(folder), Path(folder, "cache")
+    with tempfile.TemporaryDirectory(prefix="matbench-proof-") as passing:
+        place = (asked.folder or Path(passing)).resolve()
+        cache = place / "cache"
         stored = ("--baselines", str(place / "baselines"))
         clean = copy_checkout(place / "clean")
-        print("storing ratios of the unchanged copy", flush=True)
-        bench(clean, cache, "--update", *stored)
+        if not (place / "baselines").is_dir():
+            print("storing ratios of the unchanged copy", flush=True)
+            few = [f"--only={plant.subject}" for plant in PLANTS if asked.only == "caught"]
+            bench(clean, cache, "--update", "--no-work", *few, *stored)
         planted = {p.subject: copy_checkout(place / p.subject.replace(" ", "-"), p) for p in PLANTS}
         judged = ("--no-work", "--margin", asked.margin, *stored)
         if asked.only != "alarms":
