@@ -100,11 +100,11 @@ def test_stored_files_are_of_this_reference() -> None:
 def test_the_interval_of_a_median_holds_it_as_often_as_it_says() -> None:
     draw = np.random.default_rng(1)
     held = 0
-    for _ in range(1000):
+    for _ in range(300):
         median, low, high = statistics.median_interval(draw.exponential(size=25))
         assert low <= median <= high
         held += low <= np.log(2) <= high
-    assert held >= 940
+    assert held >= 282
 
 
 def test_pairs_of_processes_give_a_ratio_with_an_interval() -> None:

@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
-from attrs import define, field, frozen
+from attrs import define, evolve, field, frozen
 from numpy.typing import NDArray
 
 from matbench import plugins, spec
@@ -104,8 +104,12 @@ class Growth:
 
     def of(self, method: str, axis: str) -> list[Point]:
         """The measured points of a curve, in order."""
-        found = {p.setting: p for p in self.points if p.method == method}
-        return [found[setting] for setting in AXES[axis] if setting in found]
+        found = (self.at(method, setting) for setting in AXES[axis])
+        return [point for point in found if point is not None]
+
+    def at(self, method: str, setting: tuple[int, int, int, int]) -> Point | None:
+        """A method on one scene, if it was measured."""
+        return next((p for p in self.points if p.method == method and p.setting == setting), None)
 
     @property
     def methods(self) -> list[str]:
@@ -153,7 +157,6 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
     roofline = measure_roofline()
     end = time.monotonic() + seconds  # compiling is not growth
     points: dict[tuple[str, tuple[int, int, int, int]], Point] = {}
-    left_out: list[str] = []
     number, took = 0, 0.0
     while number == 0 or time.monotonic() + took < end:
         number, begin = number + 1, time.monotonic()
@@ -168,11 +171,16 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
                 _solve(point, instances[name], scenes[setting])
         roofline = roofline.best(measure_roofline(2))
         took = time.monotonic() - begin
-    left_out = [f"{p.method}, {_words(p.setting)}" for p in points.values() if not p.solves]
+    left_out = [_left_out(setting, [points[name, setting] for name in methods]) for setting in settings]
     measured = tuple(point for point in points.values() if point.solves)
-    growth = Growth(measured, (), roofline, tuple(left_out))
-    fits = tuple(_fits(growth, methods))
-    return Growth(measured, fits, roofline, tuple(left_out))
+    growth = Growth(measured, (), roofline, tuple(filter(None, left_out)))
+    return evolve(growth, fits=tuple(_fits(growth, methods)))
+
+
+def _left_out(setting: tuple[int, int, int, int], points: Sequence[Point]) -> str:
+    """Which methods had no time left on a scene; empty if none."""
+    missing = [point.method for point in points if not point.solves]
+    return f"{_words(setting)}: {', '.join(missing)}" if missing else ""
 
 
 def _words(setting: tuple[int, int, int, int]) -> str:

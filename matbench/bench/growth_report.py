@@ -11,6 +11,13 @@ from matbench.bench.tables import Table, seconds
 # Okabe & Ito 2008: told apart by all kinds of eyes
 _COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#cc79a7", "#e69f00", "#d55e00", "#000000")
 _POINTS = "osD^vPX"
+_UNITS = {
+    "point_updates": "point, pass",
+    "pair_similarities": "point, pair",
+    "ssd_evaluations": "window",
+    "voxels_tested": "voxel",
+    "pixel_disparities": "pixel, disparity",
+}
 _WORDS = {"pixels": "pixels of a view", "disparities": "disparities", "views": "views"}
 
 
@@ -32,11 +39,12 @@ def exponents(growth: Growth) -> Table:
 def costs(growth: Growth) -> Table:
     """Nanoseconds per unit on the largest picture, beside what the machine could do meanwhile."""
     rows = []
+    sizes = AXES["pixels"]
+    largest = next((s for s in reversed(sizes) if all(growth.at(m, s) for m in growth.methods)), sizes[0])
     for method in growth.methods:
-        curve = growth.of(method, "pixels")
-        if not curve:
+        point = growth.at(method, largest)
+        if point is None:
             continue
-        point = curve[-1]
         name, count = point.counter
         per_cell, per_unit = 1e9 * point.seconds / point.cells, 1e9 * point.seconds / count
         rows.append(
@@ -45,14 +53,13 @@ def costs(growth: Growth) -> Table:
                 seconds(point.seconds),
                 f"{per_cell:.3g}",
                 f"{per_unit:.3g}",
-                name.replace("_", " "),
+                _UNITS.get(name, name),
                 f"{per_unit * growth.roofline.arithmetic:.0f}",
                 f"{per_unit * growth.roofline.bandwidth:.0f}",
             )
         )
-    largest = max((p.setting for p in growth.points), key=lambda s: s[0] * s[1])
     title = f"Cost at {largest[0]}x{largest[1]}, {largest[2]} disparities, {largest[3]} views, one thread"
-    heads = "method", "CPU time", "ns / px disp pair", "ns / unit", "unit", "flops", "bytes"
+    heads = "method", "CPU time", "ns / pixel disparity pair", "ns / unit", "unit", "flops", "bytes"
     return Table(title, heads, tuple(rows))
 
 
