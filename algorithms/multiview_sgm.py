@@ -27,5 +27,5 @@ class MultiviewSGM(Matching, Readings):
         compared = sum(seen_from(matcher, view).ray_comparisons for view in range(matcher.space.views))
         return Estimate(
             disparity={scene.ref: matcher.disparity(maps[matcher.scene.ref])},
-            work={"pair_similarities": compared},
+            work={"pair_similarities": compared, "volume_bytes": self.volume_bytes(matcher, again=False)},
         )

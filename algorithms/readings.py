@@ -25,6 +25,11 @@ class Readings(Fusion, SemiGlobal):
 
     mending: int = field(default=3, validator=validators.ge(0))
 
+    @staticmethod
+    def volume_bytes(matcher: Matcher, again: bool) -> int:
+        """Bytes of the volumes that a reading holds at once: costs, sums of either sweep, and `again` materialities."""
+        return (4 if again else 3) * matcher.ray_bytes
+
     def first(self, matcher: Matcher, threads: int = 1) -> NDArray[np.float32]:
         """(views, H, W) maps by the better half of the pairs, as planes of the space; mended."""
         return self._read_all(matcher, lambda seen, phases: self.first_cost(seen, threads, phases), threads)[0]

@@ -75,10 +75,11 @@ class SGBM:
         mirrored = partner < scene.ref
         if mirrored:
             left, right = left[:, ::-1], right[:, ::-1]
-        pair = self.match(left, right, floor(scene.disparities.least * gap), ceil(scene.disparities.largest * gap))
+        least, largest = floor(scene.disparities.least * gap), ceil(scene.disparities.largest * gap)
+        pair = self.match(left, right, least, largest)
         disparity = pair[:, ::-1] / np.float32(gap) if mirrored else pair / np.float32(gap)
         disparity = fill_from_background(disparity) if self.fill else np.ascontiguousarray(disparity)
-        return Estimate({scene.ref: disparity})
+        return Estimate({scene.ref: disparity}, work={"pixel_disparities": disparity.size * _tried(least, largest)})
 
     def match(self, left: NDArray[np.uint8], right: NDArray[np.uint8], least: int, largest: int) -> NDArray[np.float32]:
         """Disparities of the left image of a pair, x_right = x_left - d.
@@ -99,7 +100,7 @@ class SGBM:
         -------
         (H, W) float32, in pixels, NaN where there is no answer.
         """
-        number = 16 * ceil((largest - least + 1) / 16)
+        number = _tried(least, largest)
         before = max(0, least + number)
         after = max(0, -least) + max(0, self.block_size - left.shape[1])
         area = 3 * self.block_size**2
@@ -121,6 +122,11 @@ class SGBM:
         disparity = np.asarray(sixteenths[:, before : before + left.shape[1]], np.float32) / np.float32(16)
         disparity[(disparity < least) | (disparity > largest)] = np.nan
         return disparity
+
+
+def _tried(least: int, largest: int) -> int:
+    """How many disparities OpenCV tries to cover a range: a multiple of 16."""
+    return 16 * ceil((largest - least + 1) / 16)
 
 
 def field_partner(scene: Scene) -> int:

@@ -145,6 +145,11 @@ class Matcher:
         """The same for `rays` of all rows."""
         return self.space.rows * sum(int(self.ray_spans(i, j)[:, 1].sum()) for i, j in self.pairs)
 
+    @property
+    def ray_bytes(self) -> int:
+        """Bytes of a float32 volume over the pixel rays of one view."""
+        return 4 * self.space.rows * self.space.width * self.space.planes
+
     def spans(self, i: int, j: int) -> NDArray[np.int64]:
         """(planes, 6) where the points of each plane lie that both views see.
 

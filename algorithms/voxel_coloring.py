@@ -80,7 +80,11 @@ class VoxelColoring:
         return Estimate(
             {scene.ref: fill_from_background(disparity) if self.fill else disparity},
             Volume(space, occupied, kept),
-            work={"voxels_tested": int(tested.sum()), "voxels_coloured": int(occupied.sum(dtype=np.int64))},
+            work={
+                "voxels_tested": int(tested.sum()),
+                "voxels_coloured": int(occupied.sum(dtype=np.int64)),
+                "volume_bytes": occupied.nbytes,
+            },
         )
 
 

@@ -417,6 +417,7 @@ def view(
     return DONE
 
 
+app.command("matbench.commands.bench:app", name="bench", help="Measure speed: against stored ratios, or a commit.")
 app.command("matbench.commands.check:app", name="check", help="Try methods: do they keep to what is asked of them?")
 app.command("matbench.commands.status:app", name="status", help="Show where a run stands, also while it runs.")
 app.command("matbench.commands.score:app", name="score", help="Score stored maps again: no method runs.")

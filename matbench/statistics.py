@@ -100,3 +100,15 @@ def intervals(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
         ends[:, batch] = np.quantile(rows[batch] @ share.T, tails, axis=-1)
     low, high = ends.reshape(2, *values.shape[:-1])
     return low, high
+
+
+def median_interval(values: NDArray[np.float64]) -> tuple[float, float, float]:
+    """The median, and the order statistics around it that hold the true one with `CONFIDENCE` or more.
+
+    Whatever the distribution, the number of values below its median is binomial.
+    """
+    from scipy.stats import binom
+
+    ordered = np.sort(values)
+    below = max(0, int(binom.ppf((1 - CONFIDENCE) / 2, ordered.size, 0.5)) - 1)
+    return float(np.median(ordered)), float(ordered[below]), float(ordered[-1 - below])

@@ -207,7 +207,7 @@ def test_help_is_quick_and_imports_nothing_heavy() -> None:
     assert best < 0.5
 
 
-@pytest.mark.parametrize("command", ["compare", "ablate", "fetch", "list", "view"])
+@pytest.mark.parametrize("command", ["compare", "ablate", "fetch", "list", "view", "bench"])
 def test_help_teaches_by_example(capsys: pytest.CaptureFixture[str], command: str) -> None:
     status, out, _ = run(capsys, command, "--help")
     assert status == 0

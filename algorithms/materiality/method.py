@@ -143,9 +143,13 @@ class Materiality(Matching, Readings):
         history: dict[str, list[float]] = {"changed": [], "energy_before": [], "energy": []}
         if self.start == "consensus":
             maps, compared = self.first(matcher, threads), every
+            held = self.volume_bytes(matcher, again=self.passes > 0)
         else:
             compared = matcher.comparisons
-            mu = start(matcher, matcher.all(threads), self.start == "soft", self.sharpness, threads)
+            rho = matcher.all(threads)
+            mu = start(matcher, rho, self.start == "soft", self.sharpness, threads)
+            held = mu.nbytes + max(rho.nbytes, self.volume_bytes(matcher, again=True) if self.passes else 0)
+            del rho
             rays = [by_ray(seen_rays(mu, space, view, threads)) for view in range(space.views)]
             # a view in which nothing is material ends in the farthest plane
             maps = np.nan_to_num(np.stack([fill_from_background(found) for found in rays]))
@@ -175,7 +179,7 @@ class Materiality(Matching, Readings):
             disparity={self._reference(matcher): matcher.disparity(answer)},
             volume=None if solid is None else Volume(space, solid, matcher.indices),
             history=history,
-            work={"passes": len(history["changed"]), "pair_similarities": compared},
+            work={"passes": len(history["changed"]), "pair_similarities": compared, "volume_bytes": held},
         )
 
     def _descent(self, matcher: Matcher, context: Context) -> Estimate:
@@ -202,6 +206,8 @@ class Materiality(Matching, Readings):
 
         descent = Descent(self.passes, self.optimiser == "fista", energy.safe_step, self.tolerance, threads)
         mu, history, passes, updates = descent.run(energy, mu, tell if probe.active else None)
+        fixed = rho.nbytes + mu.nbytes + sum(weights.nbytes for weights in energy.weights)
+        read = self.volume_bytes(matcher, again=True) if self.binarization == "volume" else 0
         return Estimate(
             disparity={self._reference(matcher): matcher.disparity(self._read(matcher, mu, rho, threads))},
             volume=Volume(space, mu, matcher.indices),
@@ -210,6 +216,7 @@ class Materiality(Matching, Readings):
                 "passes": passes,
                 "point_updates": updates,
                 "pair_similarities": compared,
+                "volume_bytes": fixed + max(mu.nbytes, read),
             },
         )
 

@@ -96,7 +96,8 @@ def test_agrees_with_its_slow_twin(
     assert estimate.volume is not None
     np.testing.assert_array_equal(estimate.volume.values, occupied)
     np.testing.assert_array_equal(estimate.disparity[scene.ref], disparity)
-    assert estimate.work == {"voxels_tested": tested, "voxels_coloured": int(occupied.sum())}
+    counted = {"voxels_tested": tested, "voxels_coloured": int(occupied.sum()), "volume_bytes": 4 * occupied.size}
+    assert estimate.work == counted
 
 
 @pytest.mark.parametrize(("wall", "box"), [(1, 4), (-3, -1), (-1, 2)])

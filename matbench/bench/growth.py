@@ -1,0 +1,221 @@
+"""How time grows with the picture, the disparities and the views, and how far it is from the machine's limits."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+from attrs import define, evolve, field, frozen
+from numpy.typing import NDArray
+
+from matbench import plugins, spec
+from matbench.algorithm import Algorithm, Context
+from matbench.bench.roofline import Roofline
+from matbench.bench.roofline import measure as measure_roofline
+from matbench.errors import unknown
+from matbench.scene import Scene
+from matbench.scenes import load_scene
+from matbench.statistics import CONFIDENCE
+
+METHODS = {
+    "materiality": "materiality[views=0 fineness=1]",
+    "materiality[preset=descent]": "materiality[preset=descent views=0 fineness=1]",
+    "materiality[preset=paper]": "materiality[preset=paper views=0]",
+    "multiview_sgm": "multiview_sgm[views=0 fineness=1]",
+    "okutomi_kanade": "okutomi_kanade[fineness=1]",
+    "voxel_coloring": "voxel_coloring[fineness=1]",
+    "sgbm": "sgbm",
+}
+"""Name -> selector: all views, whole-pixel planes, so that only what is varied varies."""
+
+PEER = "sgbm"
+"""Stands in every table: everybody knows it."""
+
+AXES: Mapping[str, tuple[tuple[int, int, int, int], ...]] = {
+    "pixels": ((64, 48, 16, 3), (96, 72, 16, 3), (128, 96, 16, 3), (192, 144, 16, 3), (256, 192, 16, 3)),
+    "disparities": ((128, 96, 8, 3), (128, 96, 16, 3), (128, 96, 32, 3), (128, 96, 64, 3)),
+    "views": ((128, 96, 16, 3), (128, 96, 16, 5), (128, 96, 16, 7), (128, 96, 16, 9)),
+}
+"""What is varied -> width, height, disparities and views of each scene."""
+
+COUNTERS = ("point_updates", "pair_similarities", "ssd_evaluations", "voxels_tested", "pixel_disparities")
+"""The work that time is held against: the first of these that a method counts."""
+
+
+@define
+class Point:
+    """A method on one scene: the least processor time of all solves, and what it counted."""
+
+    method: str
+    setting: tuple[int, int, int, int]
+    work: Mapping[str, int] = field(factory=dict)
+    seconds: float = float("inf")
+    solves: int = 0
+
+    def along(self, axis: str) -> float:
+        """Its place on an axis."""
+        width, height, disparities, views = self.setting
+        return float({"pixels": width * height, "disparities": disparities, "views": views}[axis])
+
+    @property
+    def cells(self) -> int:
+        """Pixels x disparities x pairs with the reference view; one pair for the peer."""
+        width, height, disparities, views = self.setting
+        return width * height * disparities * (1 if self.method == PEER else views - 1)
+
+    @property
+    def counter(self) -> tuple[str, int]:
+        """The work that it is held against."""
+        for name in COUNTERS:
+            if self.work.get(name):
+                return name, self.work[name]
+        return "pixel x disparity x pair", self.cells
+
+
+@frozen
+class Fit:
+    """Time ~ value ** exponent, by least squares on logarithms.
+
+    Parameters
+    ----------
+    exponent, low, high
+        With its interval by Student's t; NaN with fewer than three points.
+    ideal
+        The exponent of the work that the method counts over the same scenes.
+    """
+
+    method: str
+    axis: str
+    exponent: float
+    low: float
+    high: float
+    ideal: float
+
+
+@frozen
+class Growth:
+    """All that a sitting measured; `left_out` says which points were not for want of time."""
+
+    points: tuple[Point, ...]
+    fits: tuple[Fit, ...]
+    roofline: Roofline
+    left_out: tuple[str, ...]
+
+    def of(self, method: str, axis: str) -> list[Point]:
+        """The measured points of a curve, in order."""
+        found = (self.at(method, setting) for setting in AXES[axis])
+        return [point for point in found if point is not None]
+
+    def at(self, method: str, setting: tuple[int, int, int, int]) -> Point | None:
+        """A method on one scene, if it was measured."""
+        return next((p for p in self.points if p.method == method and p.setting == setting), None)
+
+    @property
+    def methods(self) -> list[str]:
+        return list(dict.fromkeys(point.method for point in self.points))
+
+
+def chosen(patterns: Sequence[str]) -> list[str]:
+    """The methods that names or patterns mean, the peer always among them."""
+    for pattern in patterns:
+        if not any(pattern == name or fnmatchcase(name, pattern) for name in METHODS):
+            raise unknown("method", pattern, METHODS)
+    wanted = [n for n in METHODS if not patterns or any(n == p or fnmatchcase(n, p) for p in patterns)]
+    return wanted if PEER in wanted else [*wanted, PEER]
+
+
+def _instance(name: str) -> Algorithm:
+    (one,) = spec.parse(METHODS[name])
+    plugin = plugins.algorithm(one.name)
+    made: Algorithm = spec.build(plugin.name, plugin.load(), one.options)
+    return made
+
+
+def _scene(setting: tuple[int, int, int, int]) -> Scene:
+    """The built-in box with so many whole disparities per view step, whatever its pair is."""
+    width, height, disparities, views = setting
+    pair_steps = max(1, views - 1 - views // 2)
+    return load_scene(f"synthetic/box[size={width}x{height} n={views} disparities=0:{(disparities - 1) * pair_steps}]")
+
+
+def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], None]) -> Growth:
+    """Time every method on every scene, on one thread, round after round until the time is used up.
+
+    In the first round scenes come from the smallest to the largest; one for which no time is left is
+    left out. Of all rounds the least time counts, as disturbances only add to it.
+    """
+    import cv2
+
+    cv2.setNumThreads(1)
+    settings = sorted({s for axis in AXES.values() for s in axis}, key=lambda s: s[0] * s[1] * s[2] * (s[3] - 1))
+    scenes: dict[tuple[int, int, int, int], Scene] = {}
+    instances = {name: _instance(name) for name in methods}
+    progress("compiling")
+    for name in methods:
+        instances[name].solve(_scene((64, 24, 4, 3)), Context())
+    roofline = measure_roofline()
+    end = time.monotonic() + seconds  # compiling is not growth
+    points: dict[tuple[str, tuple[int, int, int, int]], Point] = {}
+    number, took = 0, 0.0
+    while number == 0 or time.monotonic() + took < end:
+        number, begin = number + 1, time.monotonic()
+        for setting in settings:
+            for name in methods:
+                point = points.setdefault((name, setting), Point(name, setting))
+                if time.monotonic() > end:
+                    continue
+                progress(f"round {number}: {name}, {_words(setting)}")
+                if setting not in scenes:
+                    scenes[setting] = _scene(setting)
+                _solve(point, instances[name], scenes[setting])
+        roofline = roofline.best(measure_roofline(2))
+        took = time.monotonic() - begin
+    left_out = [_left_out(setting, [points[name, setting] for name in methods]) for setting in settings]
+    measured = tuple(point for point in points.values() if point.solves)
+    growth = Growth(measured, (), roofline, tuple(filter(None, left_out)))
+    return evolve(growth, fits=tuple(_fits(growth, methods)))
+
+
+def _left_out(setting: tuple[int, int, int, int], points: Sequence[Point]) -> str:
+    """Which methods had no time left on a scene; empty if none."""
+    missing = [point.method for point in points if not point.solves]
+    return f"{_words(setting)}: {', '.join(missing)}" if missing else ""
+
+
+def _words(setting: tuple[int, int, int, int]) -> str:
+    width, height, disparities, views = setting
+    return f"{width}x{height}, {disparities} disparities, {views} views"
+
+
+def _solve(point: Point, method: Algorithm, scene: Scene) -> None:
+    """One solve, or as many as take a hundredth of a second."""
+    spent = 0.0
+    while spent < 0.01:
+        begin = time.thread_time()
+        estimate = method.solve(scene, Context(volume=False))
+        took = time.thread_time() - begin
+        point.work, point.solves = dict(estimate.work), point.solves + 1
+        point.seconds = min(point.seconds, took)
+        spent += max(took, 1e-4)
+
+
+def _fits(growth: Growth, methods: Sequence[str]) -> Iterator[Fit]:
+    for name in methods:
+        for axis in AXES:
+            curve = growth.of(name, axis)
+            if len(curve) > 2:
+                at = np.array([point.along(axis) for point in curve])
+                work = np.array([float(point.counter[1]) for point in curve])
+                yield Fit(
+                    name, axis, *exponent(at, np.array([point.seconds for point in curve])), exponent(at, work)[0]
+                )
+
+
+def exponent(at: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Slope of log values over log at, and its interval."""
+    from scipy.stats import linregress, t
+
+    line: Any = linregress(np.log(at), np.log(values))
+    reach = float(t.ppf((1 + CONFIDENCE) / 2, at.size - 2) * line.stderr)
+    return float(line.slope), float(line.slope) - reach, float(line.slope) + reach

@@ -1,0 +1,219 @@
+"""One sitting: the subjects of tests/benchmarks timed by pytest-benchmark in a fresh process."""
+
+import importlib.util
+import json
+import os
+import runpy
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from attrs import frozen
+
+from matbench.errors import UserError, unknown
+from matbench.plugins import kernel_cache
+from matbench.statistics import median_interval
+
+BENCHMARKS = Path("tests", "benchmarks")
+ROUNDS, PARTS = 25, 3
+_LARGEST = str(2**30)  # bytes that malloc keeps rather than giving back: pages come new once, not in every round
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+@frozen
+class Timing:
+    """A subject in one sitting.
+
+    Parameters
+    ----------
+    ratio, low, high
+        Median over the rounds of subject / reference, one call each, and its 95 % interval within the sitting.
+    seconds
+        Processor time of one call, the median.
+    group
+        ``method`` or ``kernel``.
+    """
+
+    ratio: float
+    low: float
+    high: float
+    seconds: float
+    group: str
+    rounds: int
+
+
+@frozen
+class Sitting:
+    """What a process measured.
+
+    Parameters
+    ----------
+    failed
+        Subject -> why it could not be measured.
+    reference
+        Digest of the reference workload.
+    """
+
+    timings: Mapping[str, Timing]
+    failed: Mapping[str, str]
+    reference: str
+
+
+@frozen
+class Tree:
+    """Code that is measured.
+
+    Parameters
+    ----------
+    code
+        The folder that holds its ``matbench/``.
+    python
+        The interpreter whose libraries it runs with.
+    kernels
+        Where its compiled kernels are kept: a folder for each state of the code.
+    """
+
+    code: Path
+    python: Path
+    kernels: Path
+
+    @classmethod
+    def here(cls) -> "Tree":
+        """The working tree that this very code lies in.
+
+        Raises
+        ------
+        UserError
+            If matbench is not run from a checkout, or without what times it.
+        """
+        code = Path(__file__).resolve().parents[2]
+        if not (code / BENCHMARKS / "test_speed.py").is_file():
+            raise UserError(
+                f"{code} holds no {BENCHMARKS}: timings are judged in a checkout, installed by "
+                "pip install -e '.[test]'; --scaling works anywhere"
+            )
+        if importlib.util.find_spec("pytest_benchmark") is None:
+            raise UserError("pytest-benchmark is not installed: pip install -e '.[test]'")
+        return cls(code, Path(sys.executable), kernel_cache())
+
+
+def environment(tree: Tree) -> dict[str, str]:
+    """Variables of a process that measures: one thread, its own kernels, memory that is kept."""
+    kept = {"MALLOC_MMAP_THRESHOLD_": _LARGEST, "MALLOC_TRIM_THRESHOLD_": _LARGEST, "PYTHONHASHSEED": "0"}
+    threads = dict.fromkeys(_ONE_THREAD, "1")
+    return {**os.environ, **threads, **kept, "NUMBA_CACHE_DIR": str(tree.kernels)}
+
+
+def _pytest(tree: Tree, tests: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    benchmarks = tests / BENCHMARKS
+    command = [str(tree.python), "-m", "pytest", "-c", str(tests / "pyproject.toml"), "-p", "no:cacheprovider", "-q"]
+    return subprocess.run(  # noqa: S603 (this interpreter, no shell)
+        [*command, f"--confcutdir={benchmarks}", str(benchmarks / "test_speed.py"), *arguments],
+        cwd=tree.code,  # `python -m` looks there first
+        env=environment(tree),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def subjects(tree: Tree, patterns: Sequence[str] = ()) -> list[str]:
+    """The subjects of a checkout that are meant by names or patterns; all without any.
+
+    Raises
+    ------
+    UserError
+        If a pattern means none of them.
+    """
+    listed = runpy.run_path(str(tree.code / BENCHMARKS / "subjects.py"))
+    names = [*listed["METHODS"], *listed["KERNELS"]]
+    chosen: dict[str, None] = {}
+    for pattern in patterns:
+        meant = [name for name in names if pattern == name or fnmatchcase(name, pattern)]
+        if not meant:
+            raise unknown("subject", pattern, names)
+        chosen |= dict.fromkeys(meant)
+    return list(chosen) or names
+
+
+def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, tests: Path | None = None) -> Sitting:
+    """Time subjects in a fresh process.
+
+    Parameters
+    ----------
+    tests
+        The checkout whose tests/benchmarks do it; the tree's own by default.
+
+    Raises
+    ------
+    UserError
+        If the process could not measure at all, or measured other code than the tree's.
+    """
+    with tempfile.TemporaryDirectory(prefix="matbench-bench-") as place:
+        written = Path(place, "benchmarks.json")
+        done = _pytest(
+            tree,
+            tests or tree.code,
+            f"--benchmark-min-rounds={-(-rounds // PARTS)}",
+            f"--parts={PARTS}",
+            f"--benchmark-json={written}",
+            *(f"--subject={name}" for name in names),
+        )
+        try:
+            found: dict[str, Any] = json.loads(written.read_text(encoding="utf-8"))
+            measured = found["measured"]
+        except (OSError, ValueError, KeyError):
+            raise UserError(f"nothing was measured in {tree.code}: {_last_line(done)}") from None
+    if Path(measured["code"]) != tree.code.resolve():
+        raise UserError(f"{measured['code']} was measured instead of {tree.code}: is another matbench before it?")
+    parts: dict[str, list[Any]] = {}
+    for one in found["benchmarks"]:
+        if one["extra_info"].get("ratios"):
+            parts.setdefault(one["params"]["name"], []).append(one)
+    timings = {name: _timing(of_name) for name, of_name in parts.items()}
+    missing = {name: "not measured" for name in names if name not in timings}
+    return Sitting(timings, {**missing, **measured["failed"]}, measured["reference"])
+
+
+def _timing(parts: Sequence[Any]) -> Timing:
+    """All rounds of a subject together."""
+    ratios = np.concatenate([part["extra_info"]["ratios"] for part in parts])
+    seconds = float(np.median([part["extra_info"]["seconds"] for part in parts]))
+    return Timing(*median_interval(ratios), seconds, parts[0]["group"], ratios.size)
+
+
+def run_program(tree: Tree, name: str) -> Any:
+    """What a program of tests/benchmarks prints as JSON, in a fresh process.
+
+    Raises
+    ------
+    UserError
+        If it fails.
+    """
+    tests = str(tree.code / BENCHMARKS)
+    program = f"import runpy, sys; sys.path.append({tests!r}); runpy.run_module({name!r}, run_name='__main__')"
+    done = subprocess.run(  # noqa: S603 (this interpreter, no shell)
+        [str(tree.python), "-c", program],
+        cwd=tree.code,
+        env=environment(tree),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise UserError(f"{tests}/{name}.py failed: {_last_line(done)}")
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def _last_line(done: subprocess.CompletedProcess[str]) -> str:
+    lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+    return lines[-1].strip() if lines else f"exit status {done.returncode}"
+
+
+Progress = Callable[[str], None]
+"""Told what begins, in words."""

@@ -1,0 +1,107 @@
+"""What was measured, as rows of words: for the terminal and for a job summary in Markdown."""
+
+from collections.abc import Mapping, Sequence
+from math import isnan
+
+from attrs import frozen
+from rich import box
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from matbench.bench.base import Versus
+from matbench.bench.baselines import Judged
+from matbench.bench.compilation import Compilation
+from matbench.bench.measuring import Timing
+
+
+@frozen
+class Table:
+    """Rows of words under heads; the first `words` columns are words, the others numbers."""
+
+    title: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: int = 1
+
+    def rich(self) -> RichTable:
+        """For the terminal."""
+        table = RichTable(title=Text(self.title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+        table.pad_edge = False
+        for number, head in enumerate(self.heads):
+            table.add_column(head, justify="left" if number < self.words else "right", no_wrap=number == 0)
+        for row in self.rows:
+            table.add_row(*(Text(cell, style="bold red" if "slower" in row else "") for cell in row))
+        return table
+
+    def markdown(self) -> str:
+        """For a job summary."""
+        sides = ["---"] * self.words + ["--:"] * (len(self.heads) - self.words)
+        lines = [self.heads, sides, *self.rows]
+        escaped = ("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+        return f"**{self.title}**\n\n" + "\n".join(escaped) + "\n"
+
+
+def seconds(value: float) -> str:
+    """``12.3 ms``."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value * 1e9:.3g} ns"
+
+
+def _number(value: float, places: str = ".3f") -> str:
+    return "" if isnan(value) else format(value, places)
+
+
+def _reach(timing: Timing | None) -> str:
+    """Half of the interval, as a share of the ratio."""
+    return "" if timing is None else f"{(timing.high - timing.low) / (2 * timing.ratio):.1%}"
+
+
+def judged(results: Sequence[Judged]) -> Table:
+    """Layer two."""
+    rows = tuple(
+        (
+            one.name,
+            one.verdict,
+            seconds(one.timing.seconds) if one.timing else one.reason,
+            _number(one.ratio, ".4g"),
+            _reach(one.timing),
+            _number(one.stored or float("nan"), ".4g"),
+            _number(one.change, "+.1%"),
+        )
+        for one in results
+    )
+    heads = "subject", "verdict", "CPU time", "references", "+-", "stored", "change"
+    return Table("Times in units of the frozen reference", heads, rows, 2)
+
+
+def compared(results: Sequence[Versus], margin: float, base: str) -> Table:
+    """The working tree against a base."""
+    rows = tuple(
+        (
+            one.name,
+            one.verdict(margin),
+            one.reason or _number(one.ratio),
+            "" if isnan(one.low) else f"{one.low:.3f} .. {one.high:.3f}",
+        )
+        for one in results
+    )
+    heads = "subject", "verdict", "time, here / base", "95 % interval"
+    return Table(f"Working tree against {base}", heads, rows, 2)
+
+
+def compiled(found: Compilation, stored: float | None, ratio: float) -> Table:
+    """Compilation; the line of all of them has what is stored."""
+    parts = [(name, seconds(took), _number(took / found.reference, ".1f"), "") for name, took in found.seconds.items()]
+    total = ("all", seconds(sum(found.seconds.values())), f"{ratio:.1f}", "" if stored is None else f"{stored:.1f}")
+    heads = "first solve, beyond those above", "CPU time", "references", "stored"
+    return Table("Compilation, without any cached kernel", heads, (*parts, total))
+
+
+def counters(work: Mapping[str, Mapping[str, int]]) -> Table:
+    """Layer one."""
+    rows = tuple(
+        (name, ", ".join(f"{key} {count:,}" for key, count in counts.items())) for name, counts in work.items()
+    )
+    return Table("Work, exactly", ("method", "counters"), rows, 2)

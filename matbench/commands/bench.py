@@ -1,0 +1,326 @@
+"""`matbench bench`: is it as fast as it was, is it faster than another commit, and how does its time grow?"""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import attrs
+from attrs import field, frozen
+from cyclopts import App, Parameter
+
+from matbench.cli import DONE, FAILED, Console
+from matbench.errors import UserError
+
+REGRESSION = 3
+
+app = App(
+    name="bench",
+    help="Measure the methods' speed: against stored ratios, another commit, or growing scenes.",
+    help_epilogue="""\
+Times mean little on machines that others use, so every method and kernel is measured in turns with a
+frozen reference workload, and what counts is the median of the ratios. What looks slower than the ratio
+stored for this kind of machine is measured again in fresh processes, before it is called so. On a kind of
+machine without stored ratios nothing is judged. Exit status: 0 well, 1 something could not be measured,
+2 wrong usage, 3 slower, or other work than counted before.
+
+**Examples**
+
+`matbench bench`  exact counters of work, then times, judged by what is stored for this kind of machine
+
+`matbench bench --only 'semi*' --only winner`
+
+`matbench bench --update`  accept what is measured now: after an intended change, or on a new kind of machine
+
+`matbench bench --base origin/main`  working tree and another commit in turns: for a pull request
+
+`matbench bench --compile`  compilation, which has a budget of its own
+
+`matbench bench --scaling --out growth`  time against pixels, disparities and views, with figures
+""",
+    help_format="markdown",
+)
+
+
+@Parameter(name="*")
+@frozen
+class Choice:
+    """What is measured, and how it is told."""
+
+    only: Annotated[
+        list[str], Parameter(negative="", show_default=False, help="Method, kernel or pattern; may be repeated.")
+    ] = field(factory=list)
+    rounds: Annotated[int, Parameter(help="Rounds in a process.")] = 25
+    margin: Annotated[float, Parameter(help="How much slower is a regression: 0.15 is 15 per cent.")] = 0.15
+    markdown: Annotated[bool, Parameter(negative="", help="Print tables in Markdown, for a job summary.")] = False
+    as_json: Annotated[bool, Parameter(name="--json", negative="", help="Machine-readable.")] = False
+
+
+DEFAULTS = Choice()
+
+
+@app.default
+def bench(
+    *,
+    update: Annotated[
+        bool, Parameter(negative="", help="Store what is measured, for this kind of machine, and the counters.")
+    ] = False,
+    base: Annotated[str | None, Parameter(help="Commit to measure against, such as `origin/main`.")] = None,
+    pairs: Annotated[int, Parameter(help="With --base: pairs of processes.")] = 4,
+    work: Annotated[bool, Parameter(help="Check, or with --update store, the counters of work.")] = True,
+    compile: Annotated[bool, Parameter(negative="", help="Measure compilation, too.")] = False,
+    scaling: Annotated[bool, Parameter(negative="", help="Measure how time grows; judges nothing.")] = False,
+    seconds: Annotated[float, Parameter(help="With --scaling: about how long at most.")] = 180,
+    out: Annotated[Path | None, Parameter(help="With --scaling: folder for figures and tables.")] = None,
+    baselines: Annotated[
+        Path | None, Parameter(help="Folder of stored ratios; default tests/benchmarks/baselines.")
+    ] = None,
+    choice: Choice = DEFAULTS,
+) -> int:
+    """Measure the methods' speed."""
+    _check(choice, update, base, pairs, scaling, out, seconds)
+    output = _Output(choice)
+    if scaling:
+        return _grow(choice, seconds, out, output)
+    from matbench.bench.measuring import Tree, subjects
+
+    tree = Tree.here()
+    with output.progress() as progress:
+        names = subjects(tree, choice.only)
+        if base is not None:
+            status = _against(tree, base, names, pairs, choice, output, progress)
+        else:
+            judging = _Judging(tree, names, baselines, choice, output, progress)
+            status = judging.update(work, compile) if update else judging.check(work, compile)
+    output.close()
+    return status
+
+
+def _check(
+    choice: Choice, update: bool, base: str | None, pairs: int, scaling: bool, out: Path | None, seconds: float
+) -> None:
+    if sum((update, base is not None, scaling)) > 1:
+        raise UserError("--update, --base and --scaling are three different things: give one of them")
+    if out is not None and not scaling:
+        raise UserError(f"--out {out} is for figures of growth: add --scaling")
+    if out is not None and out.exists() and not out.is_dir():
+        raise UserError(f"--out {out} is a file: name a folder")
+    if not 5 <= choice.rounds <= 10000:
+        raise UserError(f"rounds {choice.rounds} is not a whole number from 5 to 10000")
+    if not 2 <= pairs <= 100:
+        raise UserError(f"pairs {pairs} is not a whole number from 2 to 100: one pair has no interval")
+    if not 0 < choice.margin <= 10:
+        raise UserError(f"margin {choice.margin:g} is not between 0 and 10; 0.15 is 15 per cent")
+    if not 1 <= seconds <= 86400:
+        raise UserError(f"seconds {seconds:g} is not between 1 and 86400")
+
+
+class _Output:
+    """Tables and lines as they are asked for; in JSON, one document at the end."""
+
+    def __init__(self, choice: Choice) -> None:
+        self._choice = choice
+        self._console = Console()
+        self.document: dict[str, Any] = {}
+
+    def table(self, table: Any) -> None:
+        if self._choice.markdown:
+            print(table.markdown())
+        elif not self._choice.as_json:
+            self._console.print(table.rich())
+
+    def say(self, line: str) -> None:
+        if not self._choice.as_json:
+            self._console.say(f"{line}\n" if self._choice.markdown else line)
+        self.document.setdefault("said", []).append(line)
+
+    @contextmanager
+    def progress(self) -> Iterator[Callable[[str], None]]:
+        """Tell on the terminal, beside the output, what is going on."""
+        beside = Console(stderr=True)
+        if beside.is_terminal:
+            with beside.status("starting") as status:
+                yield status.update
+        else:
+            yield lambda line: print(f"bench: {line}", file=sys.stderr)
+
+    def close(self) -> None:
+        if self._choice.as_json:
+            print(json.dumps(_plain(self.document), indent=1))
+
+
+def _plain(value: Any) -> Any:
+    """NaN is no JSON."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return None if isinstance(value, float) and value != value else value
+
+
+@frozen
+class _Judging:
+    """The working tree against what is stored."""
+
+    tree: Any
+    names: Sequence[str]
+    baselines: Path | None
+    choice: Choice
+    output: _Output
+    progress: Callable[[str], None]
+
+    @property
+    def _folder(self) -> Path:
+        from matbench.bench.baselines import folder
+
+        return self.baselines or folder(self.tree)
+
+    def update(self, work: bool, compile: bool) -> int:
+        """Store counters and ratios."""
+        from matbench.bench import baselines, counting, machine, tables
+        from matbench.bench.compilation import compile_all
+
+        if work:
+            self.progress("counting work")
+            counts = counting.counted(self.tree)
+            counting.store(self.tree, counts)
+            self.output.table(tables.counters(counts))
+        made = baselines.establish(self.tree, self.names, self.choice.rounds, self.progress)
+        before = [one for one in baselines.read(self._folder) if one.machine == machine.kind()]
+        kept = before[0] if before and before[0].reference == made.reference else None
+        compilation = kept.compilation if kept else None
+        if compile:
+            self.progress("compiling all methods without a cache")
+            compilation = compile_all(self.tree).ratio
+        ratios = {**(kept.ratios if kept and self.choice.only else {}), **made.ratios}
+        path = baselines.write(self._folder, attrs.evolve(made, ratios=ratios, compilation=compilation))
+        self.output.document |= {"stored": str(path), "ratios": ratios, "compilation": compilation}
+        self.output.say(f"stored: {path}")
+        return DONE
+
+    def check(self, work: bool, compile: bool) -> int:
+        """Both layers, and compilation if it is asked for."""
+        steps = [self._counters] if work else []
+        steps += [self._times]
+        steps += [self._compilation] if compile else []
+        return max([step() for step in steps])
+
+    def _counters(self) -> int:
+        from matbench.bench import counting
+
+        self.progress("counting work")
+        now = counting.counted(self.tree)
+        changed = counting.changes(counting.stored(self.tree), now)
+        self.output.document["work"] = {"counters": now, "changes": changed}
+        for line in changed:
+            self.output.say(f"other work than before: {line}")
+        if not changed:
+            self.output.say(f"work: {sum(map(len, now.values()))} counters of {len(now)} methods are what they were")
+        return REGRESSION if changed else DONE
+
+    def _times(self) -> int:
+        from matbench.bench import baselines, machine, tables
+        from matbench.bench.measuring import sit
+
+        kind = machine.kind()
+        self.progress(f"timing {len(self.names)} subjects")
+        first = sit(self.tree, self.names, self.choice.rounds)
+        stored, why = baselines.matching(baselines.read(self._folder), kind, first.reference)
+
+        def again(suspects: Sequence[str]) -> Any:
+            self.progress(f"again, in a fresh process: {', '.join(suspects)}")
+            return sit(self.tree, suspects, 2 * self.choice.rounds)
+
+        results = baselines.judge(self.names, stored, first, again, self.choice.margin)
+        self.output.document |= {
+            "machine": kind,
+            "judged": stored is not None,
+            "times": [{**attrs.asdict(one), "ratio": one.ratio, "change": one.change} for one in results],
+        }
+        self.output.table(tables.judged(results))
+        failed = [one for one in results if one.verdict == "failed"]
+        slower = [one for one in results if one.verdict == "slower"]
+        if stored is None:
+            self.output.say(f"not judged: {why}; matbench bench --update stores one")
+        for one in slower:
+            agreed = " ".join(f"{ratio:.4g}" for ratio in one.ratios)
+            self.output.say(f"slower: {one.name} by {one.change:.1%} (stored {one.stored:.4g}, measured {agreed})")
+        if len(failed) == len(results):
+            self.output.say("nothing was measured")
+        return REGRESSION if slower else FAILED if failed else DONE
+
+    def _compilation(self) -> int:
+        from statistics import median
+
+        from matbench.bench import baselines, machine, tables
+        from matbench.bench.compilation import BUDGET, compile_all
+
+        self.progress("compiling all methods without a cache")
+        found = compile_all(self.tree)
+        stored = next((one for one in baselines.read(self._folder) if one.machine == machine.kind()), None)
+        budget = stored.compilation if stored else None
+        ratios = [found.ratio]
+        while budget is not None and ratios[0] > BUDGET * budget and len(ratios) < baselines.SITTINGS:
+            self.progress(f"compiling again ({len(ratios) + 1} of {baselines.SITTINGS})")
+            ratios.append(compile_all(self.tree).ratio)
+        self.output.document["compilation"] = {**attrs.asdict(found), "ratios": ratios, "stored": budget}
+        self.output.table(tables.compiled(found, budget, median(ratios)))
+        if budget is None or median(ratios) <= BUDGET * budget:
+            return DONE
+        self.output.say(f"slower: compilation takes {median(ratios) / budget:.2f} times what is stored")
+        return REGRESSION
+
+
+def _against(
+    tree: Any,
+    name: str,
+    names: Sequence[str],
+    pairs: int,
+    choice: Choice,
+    output: _Output,
+    progress: Callable[[str], None],
+) -> int:
+    """The working tree against another commit."""
+    from matbench.bench import tables
+    from matbench.bench.base import base_tree, commit, compare
+
+    digest = commit(tree.code, name)
+    with base_tree(tree, digest, progress) as other:
+        results = compare(tree, other, names, pairs, choice.rounds, progress)
+    verdicts = {one.name: one.verdict(choice.margin) for one in results}
+    output.document |= {"base": digest, "times": [{**attrs.asdict(r), "verdict": verdicts[r.name]} for r in results]}
+    output.table(tables.compared(results, choice.margin, f"{name} ({digest[:8]})"))
+    if all(verdict == "not compared" for verdict in verdicts.values()):
+        output.say("nothing was compared")
+        return FAILED
+    missing = [one for one in results if one.reason and not one.reason.startswith("not in the base")]
+    return REGRESSION if "slower" in verdicts.values() else FAILED if missing else DONE
+
+
+def _grow(choice: Choice, seconds: float, out: Path | None, output: _Output) -> int:
+    """Growth over pixels, disparities and views."""
+    from matbench.plugins import kernel_cache
+
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))  # numba reads it when it is imported
+    from matbench.bench import growth, growth_report
+
+    methods = growth.chosen(choice.only)
+    with output.progress() as progress:
+        found = growth.measure(methods, seconds, progress)
+    if not found.points:
+        output.say("nothing was measured")
+        return FAILED
+    for table in (growth_report.exponents(found), growth_report.costs(found)):
+        output.table(table)
+    output.say(growth_report.machine(found))
+    for one in found.left_out:
+        output.say(f"without {one}: no time was left; --seconds gives more")
+    output.document |= attrs.asdict(found)
+    if out is not None:
+        for path in growth_report.write(found, out):
+            output.say(f"written: {path}")
+    output.close()
+    return DONE

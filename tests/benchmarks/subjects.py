@@ -1,0 +1,201 @@
+"""What is timed: every method and every kernel, on one thread and small scenes.
+
+Whatever a subject needs of the methods it imports itself: the same file times another commit, in which
+some of it may be missing, and that must cost no other subject. Kernels are called through the functions
+that methods call them by, where there are any: these change less.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from matbench.algorithm import Context
+from matbench.datasets.synthetic import SYNTHETIC
+from matbench.scene import Scene
+
+Work = Callable[[], object]
+CONTEXT = Context(volume=False)
+
+METHODS: Mapping[str, tuple[str, str, str | None]] = {
+    "materiality": ("materiality", "Materiality", None),
+    "materiality[preset=descent]": ("materiality", "Materiality", "descent"),
+    "materiality[preset=paper]": ("materiality", "Materiality", "paper"),
+    "multiview_sgm": ("multiview_sgm", "MultiviewSGM", None),
+    "okutomi_kanade": ("okutomi_kanade", "OkutomiKanade", None),
+    "voxel_coloring": ("voxel_coloring", "VoxelColoring", None),
+    "sgbm": ("sgbm", "SGBM", None),
+}
+
+
+def _of(module: str, name: str) -> Any:
+    return getattr(import_module(f"matbench.algorithms.{module}"), name)
+
+
+@cache
+def instance(name: str) -> Any:
+    """A method of `METHODS`."""
+    module, cls, preset = METHODS[name]
+    made = _of(module, cls)
+    return made(**made.presets[preset]) if preset else made()
+
+
+@cache
+def scene(width: int = 64, height: int = 48, n: int = 3, planes: int = 12) -> Scene:
+    """A small picture of the built-in box."""
+    options = {"size": f"{width}x{height}", "n": str(n), "disparities": f"0:{planes - 1}"}
+    return SYNTHETIC.load("box", options, None)
+
+
+def method(name: str) -> Work:
+    """A whole solve."""
+    return partial(instance(name).solve, scene(), CONTEXT)
+
+
+def _large() -> Scene:
+    return scene(96, 72, 4, 24)
+
+
+@cache
+def _matcher(name: str = "multiview_sgm") -> Any:
+    return _of("similarity", "Matcher").of(_large(), instance(name))
+
+
+def _rays() -> NDArray[np.uint8]:
+    rho: NDArray[np.uint8] = _matcher().rays(_matcher().phases(), 0, 48)
+    return rho
+
+
+def _maps() -> NDArray[np.float32]:
+    """Planes in which rays end, anywhere."""
+    space = _matcher().space
+    shape = space.views, space.rows, space.width
+    return np.random.default_rng(0).uniform(0, space.planes - 1, shape).astype(np.float32)
+
+
+@cache
+def _cost() -> NDArray[np.float32]:
+    cost: NDArray[np.float32] = instance("multiview_sgm").first_cost(_matcher())
+    return cost
+
+
+def _image() -> NDArray[np.uint8]:
+    return _large().views[_large().ref]
+
+
+def mixed_similarities() -> Work:
+    return partial(_matcher().rays, _matcher().phases(), 0, 48)
+
+
+def ssd_similarities() -> Work:
+    return partial(_matcher("materiality[preset=paper]").block, 0, 48)
+
+
+def better_half() -> Work:
+    matcher, rho = _matcher(), _rays()
+    spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
+    low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
+    cost = np.empty((rho.shape[0], *rho.shape[2:]), np.float32)
+    return partial(_of("fusion", "better_half"), rho, low, high, np.float32(0.7), cost)
+
+
+def seen_pairs() -> Work:
+    matcher, rho = _matcher(), _rays()
+    space, view = matcher.space, matcher.scene.ref
+    spans = np.stack([matcher.ray_spans(view, j) for j in range(space.views)])
+    cost, material = np.empty((2, rho.shape[0], *rho.shape[2:]), np.float32)
+    kernel, hidden = _of("fusion", "weigh_seen"), np.float32(0.7)
+    return partial(kernel, rho, matcher.pairs, _maps(), view, spans, 0, space.fineness, hidden, cost, material)
+
+
+def support() -> Work:
+    fall = np.exp(np.arange(256) / -10).astype(np.float32)
+    return partial(_of("fusion", "support"), _cost(), _image(), 0, 0, fall, 1, np.empty_like(_cost()))
+
+
+def semi_global() -> Work:
+    return partial(_of("semiglobal", "aggregate"), _cost(), _image(), 0.2, 1.0, 25.0)
+
+
+def winner() -> Work:
+    return partial(_of("semiglobal", "winner"), _cost(), _cost())
+
+
+def mending() -> Work:
+    """One round, over true maps with noise on them."""
+    truth = np.stack([_large().truth[view] for view in range(_large().n)])
+    noise = np.random.default_rng(0).normal(0, 0.6, truth.shape)
+    return partial(_of("mending", "mend"), (truth + noise).astype(np.float32), _large().views, 1.0, 1)
+
+
+def census() -> Work:
+    return partial(_of("features", "census"), _of("features", "luma")(_matcher().rows), 1)
+
+
+def alike() -> Work:
+    return partial(_of("features", "alike"), _matcher().rows, 1, 10.0)
+
+
+def _started(name: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    rho = _matcher(name).all()
+    return rho, _of("materiality.start", "start")(_matcher(name), rho, True, 30.0)
+
+
+def _pass(name: str) -> Work:
+    rho, mu = _started(name)
+    energy = instance(name)._energy(_matcher(name), rho, 1)
+    return partial(energy.step, mu, mu, 0.0, energy.safe_step, np.empty_like(mu), None, 1)
+
+
+def soft_start() -> Work:
+    rho, _ = _started("materiality[preset=paper]")
+    return partial(_of("materiality.start", "start"), _matcher("materiality[preset=paper]"), rho, True, 30.0)
+
+
+def consensus() -> Work:
+    return partial(_of("materiality.consensus", "consensus"), _matcher().space, _maps())
+
+
+def visible_cost() -> Work:
+    matcher = _matcher("materiality[preset=paper]")
+    rho, mu = _started("materiality[preset=paper]")
+    kernel = _of("materiality.binarize", "visible_cost")
+    return partial(kernel, mu, rho, matcher.space, matcher.pairs, matcher.scene.ref, 0.7)
+
+
+def edge_weights() -> Work:
+    return partial(_of("materiality.edges", "edge_weights"), _matcher().rows, _matcher().space, 10.0)
+
+
+def voxel_pooling() -> Work:
+    space = _of("sampling", "search_space")(_large())
+    images = _of("sampling", "fine_rows")(_large().views, space.fineness)
+    unmarked = np.ones((space.views, space.rows, space.samples), np.float32)
+    starts = np.array([space.start(view, 3) for view in range(space.views)])
+    sums = np.empty((3, space.rows, space.columns), np.float32)
+    kernel = _of("voxel_coloring", "pool_rows")
+    return partial(kernel, images, unmarked, starts, 1, space.fineness, sums, 0, space.rows)
+
+
+KERNELS: Mapping[str, Callable[[], Work]] = {
+    "mixed similarities": mixed_similarities,
+    "ssd similarities": ssd_similarities,
+    "better half": better_half,
+    "seen pairs": seen_pairs,
+    "support": support,
+    "semi-global": semi_global,
+    "winner": winner,
+    "mending": mending,
+    "census": census,
+    "alike": alike,
+    "pass": partial(_pass, "materiality[preset=paper]"),
+    "tied pass": partial(_pass, "materiality[preset=descent]"),
+    "soft start": soft_start,
+    "consensus": consensus,
+    "visible cost": visible_cost,
+    "edge weights": edge_weights,
+    "voxel pooling": voxel_pooling,
+}

@@ -1,0 +1,250 @@
+"""Speed that is judged: the statistics, the verdicts, the command, and a slow-down that is planted."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import prove
+import pytest
+from attrs import evolve
+from reference import digest
+from subjects import METHODS, instance, scene
+
+from matbench import statistics
+from matbench.algorithm import Context
+from matbench.bench import base, baselines, counting, growth, growth_report, machine, tables
+from matbench.bench.baselines import Baseline, Judged
+from matbench.bench.measuring import Sitting, Timing
+from matbench.bench.roofline import Roofline
+from matbench.cli import main
+from matbench.errors import UserError
+
+KIND = {"processor": "Some(R) Processor 6/1/2", "cores": "2", "numba": "0.68"}
+STORED = Baseline(KIND, "digest", {"one": 10.0, "two": 20.0})
+
+
+def sitting(**ratios: float) -> Sitting:
+    return Sitting({name: Timing(r, r, r, 1.0, "kernel", 9) for name, r in ratios.items()}, {}, "digest")
+
+
+def verdicts(first: Sitting, *later: float) -> tuple[list[Judged], list[Sequence[str]]]:
+    """What is judged of two subjects, and who was asked to sit again; the first then measures `later`."""
+    asked: list[Sequence[str]] = []
+    waiting = list(later)
+
+    def again(names: Sequence[str]) -> Sitting:
+        asked.append(names)
+        return sitting(one=waiting.pop(0))
+
+    return baselines.judge(["one", "two"], STORED, first, again, margin=0.15), asked
+
+
+def test_what_most_processes_find_slow_is_slower() -> None:
+    (one, two), asked = verdicts(sitting(one=13.0, two=20.5), 11.2, 12.9)
+    assert (one.verdict, two.verdict) == ("slower", "ok")
+    assert one.change == pytest.approx(0.29)
+    assert asked == [["one"], ["one"]]  # nobody else is measured again
+
+
+def test_one_unlucky_process_is_no_regression() -> None:
+    (one, _), asked = verdicts(sitting(one=16.0, two=20.0), 10.1, 9.9)
+    assert one.verdict == "ok"
+    assert len(asked) == 2
+
+
+def test_a_lucky_first_process_hides_nothing() -> None:
+    """What is beyond half of the margin is looked at again."""
+    (one, _), _ = verdicts(sitting(one=11.0, two=20.0), 12.8, 13.1)
+    assert one.verdict == "slower"
+
+
+def test_what_is_as_fast_as_before_is_measured_once() -> None:
+    (one, two), asked = verdicts(sitting(one=10.7, two=15.0))
+    assert (one.verdict, two.verdict, asked) == ("ok", "faster", [])
+
+
+def test_what_could_not_be_measured_failed_and_what_is_not_stored_is_new() -> None:
+    first = evolve(sitting(three=3.0), failed={"one": "ValueError: no"})
+    one, three = baselines.judge(["one", "three"], STORED, first, lambda _: pytest.fail("nobody is suspect"))
+    assert (one.verdict, one.reason, three.verdict) == ("failed", "ValueError: no", "new")
+    assert "ValueError: no" in tables.judged([one, three]).markdown()
+
+
+def test_ratios_are_stored_for_a_kind_of_machine(tmp_path: Path) -> None:
+    path = baselines.write(tmp_path, STORED)
+    assert path.name.startswith("some-processor-6-1-2-")
+    assert baselines.read(tmp_path) == [STORED]
+    assert baselines.matching([STORED], KIND, "digest") == (STORED, "")
+    found, why = baselines.matching([STORED], {**KIND, "numba": "0.69"}, "digest")
+    assert found is None
+    assert "numba 0.68 -> 0.69" in why
+    assert baselines.matching([STORED], KIND, "another")[0] is None
+    assert baselines.matching([], KIND, "digest")[0] is None
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(UserError, match="no stored baseline"):
+        baselines.read(tmp_path)
+
+
+def test_stored_files_are_of_this_reference() -> None:
+    """A changed reference makes every stored ratio worthless: measure them anew, or change it back."""
+    folder = Path(__file__).parent / "benchmarks" / "baselines"
+    assert all(one.reference == digest() for one in baselines.read(folder))
+    assert all(machine.file_name(one.machine) in {p.name for p in folder.iterdir()} for one in baselines.read(folder))
+
+
+def test_the_interval_of_a_median_holds_it_as_often_as_it_says() -> None:
+    draw = np.random.default_rng(1)
+    held = 0
+    for _ in range(300):
+        median, low, high = statistics.median_interval(draw.exponential(size=25))
+        assert low <= median <= high
+        held += low <= np.log(2) <= high
+    assert held >= 282
+
+
+def test_pairs_of_processes_give_a_ratio_with_an_interval() -> None:
+    here = [sitting(one=r) for r in (13.0, 12.8, 13.3, 13.1)]
+    before = [sitting(one=r) for r in (10.0, 10.1, 9.9, 10.0)]
+    found = base.versus("one", here, before)
+    assert found.low < found.ratio < found.high
+    assert found.ratio == pytest.approx(1.305, abs=0.01)
+    assert found.verdict(0.15) == "slower"
+    assert found.verdict(0.4) == "same"
+    assert base.versus("one", before, here).verdict(0.15) == "faster"
+    noisy = [sitting(one=r) for r in (8.0, 16.0, 9.0, 15.0)]
+    assert base.versus("one", noisy, before).verdict(0.15) == "unsure"
+    missing = Sitting({}, {"one": "AttributeError: none"}, "digest")
+    gone = base.versus("one", here, [missing] * 4)
+    assert gone.verdict(0.15) == "not compared"
+    assert gone.reason == "not in the base: AttributeError: none"
+
+
+def test_changed_counters_are_told_one_by_one() -> None:
+    before, now = {"a": {"passes": 5, "old": 1}}, {"a": {"passes": 6000, "new": 2}}
+    assert counting.changes(before, before) == []
+    assert counting.changes(before, now) == ["a: new nothing -> 2", "a: old 1 -> nothing", "a: passes 5 -> 6,000"]
+
+
+def test_exponents_are_those_of_powers() -> None:
+    at = np.array([1.0, 2.0, 4.0, 8.0])
+    assert growth.exponent(at, 3 * at**1.5) == pytest.approx((1.5, 1.5, 1.5))
+    slope, low, high = growth.exponent(at, at * np.array([1.1, 0.9, 1.0, 1.05]))
+    assert low < slope < high
+
+
+@pytest.mark.parametrize("name", [n for n in METHODS if n not in ("okutomi_kanade", "sgbm")])
+def test_counted_bytes_of_volumes_are_allocated(name: str) -> None:
+    """The volumes that a method counts are most of what it holds at once."""
+    import tracemalloc
+
+    large = scene(96, 64, 3, 40)
+    instance(name).solve(scene(), Context(volume=False))  # compiles
+    tracemalloc.start()
+    try:
+        counted = instance(name).solve(large, Context(volume=False)).work["volume_bytes"]
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert counted <= peak < 2 * counted
+
+
+def test_growth_is_drawn_with_the_peer_and_the_ideal(tmp_path: Path) -> None:
+    settings = sorted({s for axis in growth.AXES.values() for s in axis})
+    points = []
+    for name, power in (("okutomi_kanade", 1.0), ("sgbm", 1.2)):
+        for setting in settings:
+            point = growth.Point(name, setting, {"ssd_evaluations": 10})
+            point.work = {"ssd_evaluations": point.cells}
+            point.seconds, point.solves = 1e-9 * point.cells**power, 1
+            points.append(point)
+    found = growth.Growth(tuple(points), (), Roofline(10, 50), ())
+    found = evolve(found, fits=tuple(growth._fits(found, found.methods)))
+    text = growth_report.exponents(found).markdown() + growth_report.costs(found).markdown()
+    assert "sgbm (peer)" in text
+    assert "1.20 +- 0.00 (1.00)" in text
+    written = growth_report.write(found, tmp_path / "new")
+    assert [path.name for path in written] == ["growth.csv", "growth.png", "growth.pdf"]
+    assert all(path.stat().st_size > 500 for path in written)
+    assert growth.chosen(["okutomi*"]) == ["okutomi_kanade", "sgbm"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--only", "winer"], "unknown subject 'winer': did you mean 'winner'?"),
+        (["--rounds", "2"], "rounds 2 is not"),
+        (["--margin", "0"], "margin 0 is not"),
+        (["--base", "no-such-commit"], "base 'no-such-commit' is no commit"),
+        (["--base=--help-me"], "base '--help-me' is no commit"),
+        (["--update", "--base", "HEAD"], "three different things"),
+        (["--out", "x"], "add --scaling"),
+        (["--scaling", "--only", "nobody"], "unknown method 'nobody'"),
+        (["--pairs", "1", "--base", "HEAD"], "one pair has no interval"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["bench", *arguments])
+    assert stopped.value.code == 2
+    complaint = capsys.readouterr().err.strip().splitlines()[-1]
+    assert said in complaint
+
+
+def _run(code: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """`matbench bench` of a copy of the checkout."""
+    cache = {"XDG_CACHE_HOME": str(code.parent / "cache")}
+    command = [sys.executable, "-m", "matbench", "bench", *arguments]
+    return subprocess.run(command, cwd=code, env={**os.environ, **cache}, capture_output=True, text=True, check=False)
+
+
+def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path) -> None:
+    """The short version of tests/benchmarks/prove.py, with a slow-down that no noise comes near."""
+    code = prove.copy_checkout(tmp_path / "code")
+    chosen = ("--only", "voxel pooling", "--rounds", "9", "--margin", "0.4")
+    judged = ("--no-work", "--json", "--baselines", str(tmp_path / "baselines"))
+
+    new = _run(code, *chosen, *judged)
+    assert new.returncode == 0, new.stderr
+    assert "not judged: no baseline is stored" in new.stdout
+    (first,) = json.loads(new.stdout)["times"]
+    stored = Baseline(machine.kind(), digest(), {"voxel pooling": first["ratio"]})
+    baselines.write(tmp_path / "baselines", stored)
+    unchanged = _run(code, *chosen, *judged)
+    assert unchanged.returncode == 0, unchanged.stdout
+
+    git = ("git", "-C", str(code), "-c", "user.name=Tester", "-c", "user.email=tester@example.org")
+    for arguments in (("init", "-q"), ("add", "-A"), ("commit", "-qm", "as it was")):
+        subprocess.run([*git, *arguments], check=True)
+    kernels = code / "algorithms" / "voxel_coloring.py"
+    text = kernels.read_text(encoding="utf-8")
+    loop = "    for y in range(first, end):\n        number = sums[0, y]\n"
+    assert text.count(loop) == 1
+    twice = loop.replace(
+        "y in range(first, end):\n", "turn in range(2 * (end - first)):\n        y = first + turn // 2\n"
+    )
+    kernels.write_text(text.replace(loop, twice), encoding="utf-8")
+    slower = _run(code, *chosen, *judged)
+    assert slower.returncode == 3, slower.stdout
+    assert json.loads(slower.stdout)["times"][0]["verdict"] == "slower"
+
+    against = _run(code, *chosen, "--base", "HEAD", "--pairs", "2", "--markdown")
+    (row,) = [line for line in against.stdout.splitlines() if line.startswith("| voxel pooling |")]
+    assert 1.5 < float(row.split("|")[3]) < 2.7
+    left = subprocess.run([*git, "worktree", "list"], check=True, capture_output=True, text=True)
+    assert len(left.stdout.splitlines()) == 1
+
+
+def test_without_a_checkout_it_says_so(tmp_path: Path) -> None:
+    code = prove.copy_checkout(tmp_path / "installed")
+    shutil.rmtree(code / "tests")
+    done = _run(code)
+    assert done.returncode == 2
+    assert "timings are judged in a checkout" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
