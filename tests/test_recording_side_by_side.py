@@ -145,7 +145,7 @@ def test_choices_are_read_and_compared() -> None:
 @pytest.mark.parametrize(
     ("tokens", "said"),
     [
-        (["compare", "--record", "slice", "-s", "synthetic/box"], "unknown part of a recording 'slice': did you mean"),
+        (["compare", "--record", "slice", "-s", "synthetic/box"], "unknown part 'slice' of a recording: did you mean"),
         (["compare", "-s", "synthetic/box", "--record", "passes=x"], "passes 'x' is not a whole number from 0 to 200"),
         (["compare", "-s", "synthetic/box", "--record", "--rows", "5,"], "row '' is not a whole number"),
         (["compare", "-s", "synthetic/box", "--record", "--rows", "5,999"], "row 999 of synthetic/box: 0 to"),

@@ -247,8 +247,9 @@ def test_a_full_disk_stops_the_run_and_the_same_command_ends_it(tmp_path: Path) 
     if told.returncode in (1, 77) and "status" not in told.stdout:
         pytest.skip(f"a small file system cannot be mounted here: {told.stderr}")
     first, second = told.stdout.split("status ")[0], told.stdout.split("status ")[1]
-    assert "stopped: run folder" in first, told.stdout + told.stderr
-    assert "No space left on device" in first
+    assert "stopped: run folder" not in first, "not where the tables are"
+    assert told.stderr.count("stopped: run folder") == 1, told.stdout + told.stderr
+    assert "No space left on device" in told.stderr
     assert "Traceback" not in told.stdout + told.stderr
     assert second.startswith("1\n")
     assert "status 0" in told.stdout

@@ -329,7 +329,7 @@ def test_choosing_views_rescales() -> None:
     ("name", "options", "words"),
     [
         ("boxes", {}, "did you mean 'box'"),
-        ("box", {"sed": "1"}, "n, noise, ref, seed, size, views"),
+        ("box", {"sed": "1"}, "n, noise, predict, ref, seed, size, views"),
         ("box", {"n": "1"}, "from 2 to 25"),
         ("box", {"n": "many"}, "from 2 to 25"),
         ("box", {"seed": "-1"}, "from 0"),

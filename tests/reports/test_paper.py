@@ -189,8 +189,8 @@ def test_the_command_prints_or_writes(run: Path, report: Report, capsys: pytest.
         (["--format", "doc"], "doc"),
         (["-o", "t.doc"], "must end in .tex, .md or .csv"),
         (["-o", "/no/such/t.md"], "folder '/no/such' of --out does not exist"),
-        (["-m", "total_bad_3"], "unknown metric of this run 'total_bad_3': did you mean 'total_bad_1'?"),
-        (["--region", "ocd"], "unknown region of total_bad_1 in this run 'ocd': did you mean 'occ'?"),
+        (["-m", "total_bad_3"], "unknown metric 'total_bad_3' of this run: did you mean 'total_bad_1'?"),
+        (["--region", "ocd"], "unknown region 'ocd' of total_bad_1 in this run: did you mean 'occ'?"),
     ],
 )
 def test_wrong_usage_is_one_line(run: Path, capsys: pytest.CaptureFixture[str], tokens: list[str], said: str) -> None:
