@@ -190,7 +190,7 @@ def descend(mu, slope, y, k, step, bias, one, new, slopes):  # type: ignore[no-u
 
 @helper
 def tie(mu, above, below, w_above, w_below, w_along, across, along, slope):  # type: ignore[no-untyped-def]
-    """Adjacent-plane part of E_smooth (equation 8) for one plane of a row: what ties it to the next row and along itself.
+    """Part of E_smooth (equation 8) of one plane of a row: what ties it to the next row and along itself.
 
     Parameters
     ----------
