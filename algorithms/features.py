@@ -1,4 +1,4 @@
-"""What is compared at a pixel besides its colour: horizontal gradient and census of the luma (SPEC 8)."""
+"""What is compared besides colour: horizontal gradient and census of the luma (docs/concepts/methods.md)."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""One cost for every pixel and plane of a view, from the similarities of several pairs (SPEC 8)."""
+"""One cost for every pixel and plane of a view, from the similarities of several pairs (equations 13-15)."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Similarities rho_ij of windows in pairs of views, over all target points (SPEC 1)."""
+"""Similarities rho_ij of windows in pairs of views, over all target points (docs/concepts/methods.md)."""
 
 from itertools import combinations, pairwise
 from typing import Literal, get_args
@@ -24,7 +24,7 @@ Features = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint16], N
 
 
 def pairs(views: int, which: PairSet, ref: int = 0) -> NDArray[np.int64]:
-    """(pairs, 2) the set r of SPEC 1, left view first.
+    """(pairs, 2) the set r of equation 6, left view first.
 
     ``all`` pairs of views, the ``consecutive`` ones, or those that the view `ref` is part of
     (``reference``).

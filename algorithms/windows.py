@@ -1,4 +1,4 @@
-"""Similarities of windows in one pair of views (SPEC 1), plane by plane and row by row.
+"""Similarities of windows in one pair of views (docs/concepts/methods.md), plane by plane and row by row.
 
 Rows of a view are (phases, channels, H, samples) colours, (phases, H, samples) gradients and
 (phases, words, H, samples) census; what is compared at a point is sample `x + ui` of one view with

@@ -2,12 +2,14 @@
 
 Long commands are shortened by these rules, and by no others:
 
-- synthetic scenes are computed 64x48 pixels small, and of `synthetic/*` only `synthetic/box`;
-- where no method is named `sgbm` is taken, not all of them;
+- synthetic scenes are computed 64x48 pixels small, rows to match, and of `synthetic/*` only `synthetic/box`;
+- where no method is named `sgbm` is taken, not all of them, and where no scene is `synthetic/box`;
 - the page of the report is drawn for the first comparison only; all write the tables;
 - on real scenes (`--data DIR`) everything happens up to the first cell, which takes minutes: the scenes are read and
   the plan is written. An ablation of real scenes is only asked which scenes it means and what varies in it;
-- `fetch` needs the network: it tells what it would fetch (`--dry-run`);
+- `fetch` needs the network, `--dask` a cluster: they tell what they would do (`--dry-run`);
+- `check` takes many solves: the methods that it would try are looked for;
+- `bench` takes minutes: its options are read;
 - `view` opens a window: the recording that it would show is looked for.
 """
 
@@ -25,28 +27,41 @@ import pytest
 from scene_files import Layers, write_png
 from shown import INLINE, LINES, METHOD, PAGES, ROOT, SCENE, TEXT
 
-from matbench import ablation, comparison, plan, scenes
+from matbench import ablation, comparison, contract, plan, scenes
 from matbench.cli import app, main
 from matbench.spec import Spec, parse
 
 ON_REAL = [line for line in LINES if "--data DIR" in line and " fetch " not in line]
 ELSEWHERE = [line for line in LINES if line not in ON_REAL]
+STAGES = ("report", "figure", "status", "export", "score", "view")
+"""What needs a run, in this order where a page shows it after its run; all other commands come before."""
+HEIGHT, FULL_HEIGHT = 48, 180
+"""Rows of synthetic scenes, here and unless told otherwise."""
 
 
 def small(selector: str) -> list[str]:
     """The same scenes, computed in small pictures."""
     found = [Spec("synthetic/box" if s.name == "synthetic/*" else s.name, s.options) for s in parse(selector)]
-    size = {"size": "64x48"}
+    size = {"size": f"64x{HEIGHT}"}
     return [str(Spec(s.name, s.options | size)) if s.name.startswith("synthetic/") else str(s) for s in found]
 
 
 def shortened(line: str) -> list[str]:
     tokens, out = shlex.split(line)[1:], []
     for before, token in pairwise(["", *tokens]):
-        out += small(token) if before == "-s" or token.startswith("synthetic/") else [token]
-    if tokens[0] == "compare" and "-a" not in tokens:
-        out += ["-a", "sgbm"]
-    return [*out, "--dry-run"] if tokens[0] == "fetch" else out
+        if before in ("--row", "--rows"):
+            out += [",".join(str(int(row) * HEIGHT // FULL_HEIGHT) for row in token.split(","))]
+        else:
+            out += small(token) if before == "-s" or token.startswith("synthetic/") else [token]
+    if tokens[0] == "compare":
+        out += [] if "-a" in tokens else ["-a", "sgbm"]
+        out += [] if "-s" in tokens else ["-s", *small("synthetic/box")]
+    return [*out, "--dry-run"] if tokens[0] == "fetch" or "--dask" in tokens else out
+
+
+def stage(line: str) -> int:
+    command = shlex.split(line)[1]
+    return STAGES.index(command) if command in STAGES else -1
 
 
 def own_scene(folder: Path) -> None:
@@ -56,6 +71,14 @@ def own_scene(folder: Path) -> None:
     for view, name in enumerate(("left", "middle", "right")):
         write_png(folder / f"{name}.png", world.view(view - 1))
     write_png(folder / "middle_disparity.png", (world.truth() * 16).astype(np.uint8))
+
+
+def own_program(path: Path) -> None:
+    """A program that is called as the guide says, and may be told to hurry."""
+    matcher = (ROOT / "tests/programs/block_matcher.py").read_text()
+    hurry = 'sys.argv = [word for word in sys.argv if word != "--fast"]\n'
+    path.write_text(f"#!{sys.executable}\nimport sys\n{hurry}{matcher}")
+    path.chmod(0o755)
 
 
 def run(tokens: list[str]) -> int:
@@ -71,6 +94,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     own_scene(desk / "my_scene")
     (desk / "mine.py").write_text(METHOD)
     (desk / "algorithms").symlink_to(ROOT / "algorithms")
+    own_program(desk / "mine")
     return desk
 
 
@@ -79,8 +103,15 @@ def test_commands_run_one_after_another(
 ) -> None:
     from matbench import recording
 
-    seen: list[Path] = []
-    monkeypatch.setattr(recording, "view", lambda path, web: seen.append(path))
+    seen: list[bool] = []
+    monkeypatch.setattr(recording, "view", lambda path, web: seen.append(path.is_file()))
+    tried: list[plan.Method] = []
+
+    def check(method: plan.Method, *_: object) -> list[contract.Finding]:
+        tried.append(method)
+        return [contract.Finding("answers", "", "pass")]
+
+    monkeypatch.setattr(contract, "check", check)
     drawn: list[Path] = []
     draw = comparison.Comparison.report
 
@@ -91,14 +122,22 @@ def test_commands_run_one_after_another(
     monkeypatch.setattr(comparison.Comparison, "report", report)
     monkeypatch.chdir(desk)
     monkeypatch.delenv("MATBENCH_DATA", raising=False)
-    for line in sorted(ELSEWHERE, key=lambda line: " view " in line):  # a guide shows each after its recording
-        status = run(shortened(line.replace("--data DIR", "--data nowhere")))
+    for line in sorted(ELSEWHERE, key=stage):
+        tokens = shortened(line.replace("--data DIR", "--data nowhere"))
+        if tokens[0] == "bench":
+            app.parse_args(tokens, exit_on_error=False, print_error=False)
+            continue
+        status = run(tokens)
         said = capsys.readouterr()
         if " scene new " in line:
             (desk / "my_scene" / "scene.toml").write_text(SCENE)
         assert status == 0, f"{line}\n{said.out[-2000:]}{said.err}"
     assert len(seen) == sum(" view " in line for line in LINES)
-    assert all(path.is_file() for path in (*seen, drawn[0]))
+    assert all(seen)
+    assert drawn[0].is_file()
+    assert {method.algorithm for method in tried} == {"mine", "okutomi_kanade", "materiality", "command"}
+    assert b"\\toprule" in Path("table.tex").read_bytes()
+    assert Path("runs/both/results.csv").is_file()
 
 
 def test_commands_on_real_scenes_are_ready_to_run(
@@ -156,6 +195,7 @@ def test_the_site_builds_and_fetches_nothing(tmp_path: Path) -> None:
         assert "arithmatex" not in text, f"{name}: an equation is left in TeX"
     assert pages["concepts/materiality.html"].count("<math") > 20
     assert 'id="eq-3"' in pages["concepts/materiality.html"]
-    for command in ("compare", "ablate", "list", "view", "fetch", "scene check"):
+    shown = ["compare", "ablate", "check", "list", "status", "score", "export", "report", "bench", "view", "fetch"]
+    for command in (*shown, "scene check", "figure slice", "figure maps"):
         assert f"matbench {command}" in html.unescape(pages["reference/commands.html"])
     assert "lambda of the count term" in pages["reference/methods.html"], "docstrings are shown"

@@ -1,4 +1,4 @@
-"""Visibility, energy, exact gradient and step of one epipolar plane (SPEC 1-2), in float32 or float64.
+"""Visibility, energy, exact gradient and step of one epipolar plane (equations 3, 6-10), in float32 or float64.
 
 Arrays of a row: `mu` (planes, columns) over the target points; what belongs to a view lies in its
 own samples, so that a ray keeps its place from plane to plane. View i starts in plane k at column
@@ -101,7 +101,7 @@ def chain(  # type: ignore[no-untyped-def]
     mu, slope
         (columns,) of this plane. A `slope` of None starts at 0.
     seen, behind
-        (views, wide) V and A of SPEC 2. `place` is column 0 in the row of `view`; in the next
+        (views, wide) V and A of equations 3, 9 and 10. `place` is column 0 in the row of `view`; in the next
         view's it is `slide` less.
     rho
         (rows, pairs, planes, columns).
@@ -190,7 +190,7 @@ def descend(mu, slope, y, k, step, bias, one, new, slopes):  # type: ignore[no-u
 
 @helper
 def tie(mu, above, below, w_above, w_below, w_along, across, along, slope):  # type: ignore[no-untyped-def]
-    """Adjacent-plane part of E_smooth (SPEC 4) for one plane of a row: what ties it to the next row and along itself.
+    """Part of E_smooth (equation 8) of one plane of a row: what ties it to the next row and along itself.
 
     Parameters
     ----------

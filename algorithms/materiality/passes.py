@@ -256,7 +256,7 @@ class Energy:
 
     @property
     def safe_step(self) -> float:
-        """Below the inverse of the largest curvature of the terms that couple many points (SPEC 3)."""
+        """Below the inverse of the largest curvature of the terms that couple many points (equation 11)."""
         _, planes, columns = self.space.shape
         counting = 2 * self.count * planes * columns / self.target
         return 1 / (counting + 8 * (self.across + self.along) + 2 * len(self.pairs))
