@@ -93,9 +93,9 @@ PLANTS = (
         "algorithms/materiality/passes.py",
         (
             (
-                "        over_rows(work, space.rows, threads, block)\n        if slopes",
-                "        over_rows(work, space.rows, threads, block)\n"
-                "        over_rows(work, (space.rows * 3 + 9) // 10, threads, block)\n        if slopes",
+                "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n",
+                "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n"
+                "        over_rows(borrow, (self.space.rows * 3 + 9) // 10, threads, share(self.space.rows, threads))\n",
             ),
         ),
     ),
