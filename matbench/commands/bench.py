@@ -25,8 +25,8 @@ Times mean little on machines that others use, so every method and kernel is mea
 frozen reference workload, and what counts is the median of the ratios. What looks slower than the ratio
 stored for this kind of machine is measured again in fresh processes, before it is called so. Ratios are
 stored without and with other work on every core, as that moves some of them. On a kind of machine without
-stored ratios nothing is judged. Exit status: 0 well, 1 something could not be measured,
-2 wrong usage, 3 slower, or other work than counted before.
+stored ratios nothing is judged. Exit status: 0 well, 1 something could not be measured, 2 wrong usage,
+3 slower, or other work than counted before.
 
 **Examples**
 

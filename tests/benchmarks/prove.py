@@ -1,8 +1,8 @@
 """Is a slow-down of 1.3 caught, and unchanged code left in peace? Counts both, with `matbench bench` itself.
 
-    python tests/benchmarks/prove.py --tries 20 --folder proof
-    python tests/benchmarks/prove.py --tries 20 --folder proof --load
-    python tests/benchmarks/prove.py --tries 5 --folder proof --load --only base
+    python tests/benchmarks/prove.py --tries 20 --folder ../proof
+    python tests/benchmarks/prove.py --tries 20 --folder ../proof --load
+    python tests/benchmarks/prove.py --tries 5 --folder ../proof --load --only base
 
 The checkout is copied, and ratios are stored from the copy. Then, in turns: the unchanged copy is measured
 with all subjects, and any alarm is a false one; and copies in whose source a kernel does 30 % more of its
