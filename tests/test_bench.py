@@ -13,19 +13,19 @@ import prove
 import pytest
 from attrs import evolve
 from reference import digest
-from subjects import METHODS, instance, scene
+from subjects import KERNELS, METHODS, instance, scene
 
 from matbench import statistics
 from matbench.algorithm import Context
 from matbench.bench import base, baselines, counting, growth, growth_report, machine, tables
-from matbench.bench.baselines import Baseline, Judged
+from matbench.bench.baselines import Baseline, Judged, Stored
 from matbench.bench.measuring import Sitting, Timing
 from matbench.bench.roofline import Roofline
 from matbench.cli import main
 from matbench.errors import UserError
 
 KIND = {"processor": "Some(R) Processor 6/1/2", "cores": "2", "numba": "0.68"}
-STORED = Baseline(KIND, "digest", {"one": 10.0, "two": 20.0})
+STORED = Baseline(KIND, "digest", {"one": Stored(10, 10), "two": Stored(20, 20), "moved": Stored(8, 12.5)})
 
 
 def sitting(**ratios: float) -> Sitting:
@@ -39,7 +39,7 @@ def verdicts(first: Sitting, *later: float) -> tuple[list[Judged], list[Sequence
 
     def again(names: Sequence[str]) -> Sitting:
         asked.append(names)
-        return sitting(one=waiting.pop(0))
+        return sitting(one=waiting.pop(0)) if waiting else Sitting({}, {"one": "it went away"}, "digest")
 
     return baselines.judge(["one", "two"], STORED, first, again, margin=0.15), asked
 
@@ -61,6 +61,28 @@ def test_a_lucky_first_process_hides_nothing() -> None:
     """What is beyond half of the margin is looked at again."""
     (one, _), _ = verdicts(sitting(one=11.0, two=20.0), 12.8, 13.1)
     assert one.verdict == "slower"
+
+
+def test_what_cannot_be_measured_again_has_failed() -> None:
+    (one, _), _ = verdicts(sitting(one=13.0, two=20.0), 13.0)
+    assert (one.verdict, one.reason) == ("failed", "it went away")
+
+
+@pytest.mark.parametrize("ratio", [8.0, 10.0, 12.5, 13.4])
+def test_a_ratio_that_load_moves_is_no_regression_within_what_was_seen(ratio: float) -> None:
+    (moved,) = baselines.judge(["moved"], STORED, sitting(moved=ratio), lambda _: sitting(moved=ratio))
+    assert moved.verdict == "ok"
+    assert not STORED.ratios["moved"].steady
+    slow = sitting(moved=13.5)
+    assert baselines.judge(["moved"], STORED, slow, lambda _: slow)[0].verdict == "slower"
+
+
+@pytest.mark.parametrize("loaded", [1 / baselines.STEADY, 1.0, baselines.STEADY])
+def test_a_slow_down_of_1_3_is_beyond_the_limit_with_and_without_load(loaded: float) -> None:
+    """And unchanged code is not, with a margin of four per cent for noise on either side."""
+    stored = Stored(1.0, loaded)
+    assert stored.steady
+    assert 1.04 * max(1.0, loaded) < stored.limit() < 1.3 * min(1.0, loaded) / 1.04
 
 
 def test_what_is_as_fast_as_before_is_measured_once() -> None:
@@ -85,7 +107,10 @@ def test_ratios_are_stored_for_a_kind_of_machine(tmp_path: Path) -> None:
     assert "numba 0.68 -> 0.69" in why
     assert baselines.matching([STORED], KIND, "another")[0] is None
     assert baselines.matching([], KIND, "digest")[0] is None
+    assert baselines.replaced(tmp_path, evolve(STORED, ratios={})) == STORED
+    assert baselines.replaced(tmp_path, evolve(STORED, reference="another")) is None
     path.write_text("{", encoding="utf-8")
+    assert baselines.replaced(tmp_path, STORED) is None  # and --update writes it anew
     with pytest.raises(UserError, match="no stored baseline"):
         baselines.read(tmp_path)
 
@@ -204,6 +229,12 @@ def _run(code: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=code, env={**os.environ, **cache}, capture_output=True, text=True, check=False)
 
 
+def test_slow_downs_can_still_be_planted() -> None:
+    for plant in prove.PLANTS:
+        compile(prove.planted(plant), plant.file, "exec")
+        assert plant.subject in KERNELS
+
+
 def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path) -> None:
     """The short version of tests/benchmarks/prove.py, with a slow-down that no noise comes near."""
     code = prove.copy_checkout(tmp_path / "code")
@@ -214,7 +245,7 @@ def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path)
     assert new.returncode == 0, new.stderr
     assert "not judged: no baseline is stored" in new.stdout
     (first,) = json.loads(new.stdout)["times"]
-    stored = Baseline(machine.kind(), digest(), {"voxel pooling": first["ratio"]})
+    stored = Baseline(machine.kind(), digest(), {"voxel pooling": Stored(first["ratio"], first["ratio"])})
     baselines.write(tmp_path / "baselines", stored)
     unchanged = _run(code, *chosen, *judged)
     assert unchanged.returncode == 0, unchanged.stdout

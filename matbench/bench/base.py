@@ -70,13 +70,15 @@ def commit(code: Path, name: str) -> str:
     Raises
     ------
     UserError
-        If there is none of that name.
+        If there is none of that name, or no repository.
     """
+    _git(code, "rev-parse", "--git-dir")
     try:
         return _git(code, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
     except UserError:
         raise UserError(
-            f"base {name!r} is no commit of {code}: name a branch, a tag or a digest, such as HEAD~1"
+            f"base {name!r} is no commit of {code}: name a branch, a tag or a digest, such as HEAD~1, "
+            "and git fetch first what is not here"
         ) from None
 
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from math import sqrt
 from pathlib import Path
 from statistics import median
 from typing import Literal
@@ -10,19 +11,53 @@ import cattrs
 from attrs import frozen
 
 from matbench.bench import machine
+from matbench.bench.load import load
 from matbench.bench.measuring import BENCHMARKS, ROUNDS, Progress, Sitting, Timing, Tree, sit
 from matbench.errors import UserError
 
 MARGIN = 0.15
 """How far a ratio may lie above the stored one, as a share of it."""
 
+STEADY = 1.15
+"""How far apart the ratios with and without load may lie for a slow-down of 1.3 to be seen in both."""
+
 SITTINGS = 3
 """Fresh processes that decide together: the median of so many must lie beyond the margin."""
 
-UPDATES = 5
-"""Fresh processes whose median is stored."""
+UPDATES = 3
+"""Fresh processes whose median is stored, without load; and so many with it."""
 
 Verdict = Literal["ok", "slower", "faster", "new", "failed"]
+
+
+@frozen
+class Stored:
+    """Ratios of a subject: what memory and caches others use slows it more, or less, than the reference.
+
+    Parameters
+    ----------
+    quiet
+        Median of several processes on the machine as it was.
+    loaded
+        The same while memory was streamed on every core, see `matbench.bench.load`.
+    """
+
+    quiet: float
+    loaded: float
+
+    @property
+    def middle(self) -> float:
+        """What is measured is compared with this: nobody knows how much else the machine does meanwhile."""
+        return sqrt(self.quiet * self.loaded)
+
+    @property
+    def steady(self) -> bool:
+        """Whether a slow-down of 1.3 is beyond the limit with and without load."""
+        return max(self.quiet, self.loaded) <= STEADY * min(self.quiet, self.loaded)
+
+    def limit(self, margin: float = MARGIN) -> float:
+        """What is beyond it is slower: the margin above the middle, and half of it above either ratio."""
+        return max(self.middle * (1 + margin), max(self.quiet, self.loaded) * (1 + margin / 2))
 
 
 @frozen
@@ -36,14 +71,14 @@ class Baseline:
     reference
         Digest of the reference workload that ratios are in units of.
     ratios
-        Subject -> median of the ratios of several processes.
+        Subject -> its ratios.
     compilation
-        The same of compiling all methods, in units of compiling the reference; None if it was not measured.
+        The time of compiling all methods, in units of compiling the reference; None if it was not measured.
     """
 
     machine: Mapping[str, str]
     reference: str
-    ratios: Mapping[str, float]
+    ratios: Mapping[str, Stored]
     compilation: float | None = None
 
 
@@ -59,6 +94,8 @@ class Judged:
         One of each sitting.
     stored
         None if none is.
+    limit
+        Beyond which it is slower, as a share of the middle of the stored ratios; NaN without.
     reason
         Why it could not be measured.
     """
@@ -67,7 +104,8 @@ class Judged:
     verdict: Verdict
     timing: Timing | None
     ratios: tuple[float, ...] = ()
-    stored: float | None = None
+    stored: Stored | None = None
+    limit: float = float("nan")
     reason: str = ""
 
     @property
@@ -77,8 +115,8 @@ class Judged:
 
     @property
     def change(self) -> float:
-        """Measured over stored, less one; NaN without either."""
-        return self.ratio / self.stored - 1 if self.stored else float("nan")
+        """Measured over the middle of the stored ratios, less one; NaN without either."""
+        return self.ratio / self.stored.middle - 1 if self.stored else float("nan")
 
 
 def folder(tree: Tree) -> Path:
@@ -94,23 +132,37 @@ def read(place: Path) -> list[Baseline]:
     UserError
         If a file there is none.
     """
-    found = []
-    for path in sorted(place.glob("*.json")):
-        try:
-            found.append(cattrs.structure(json.loads(path.read_text(encoding="utf-8")), Baseline))
-        except Exception as error:
-            raise UserError(f"{path} is no stored baseline: delete it, or write it anew with --update") from error
-    return found
+    return [_read(path) for path in sorted(place.glob("*.json"))]
+
+
+def _read(path: Path) -> Baseline:
+    try:
+        return cattrs.structure(json.loads(path.read_text(encoding="utf-8")), Baseline)
+    except Exception as error:
+        raise UserError(f"{path} is no stored baseline: delete it, or write it anew with --update") from error
+
+
+def replaced(place: Path, baseline: Baseline) -> Baseline | None:
+    """What is stored of this kind of machine; None if that cannot be read, or is of another reference."""
+    try:
+        before = _read(place / machine.file_name(baseline.machine))
+    except UserError:
+        return None
+    return before if before.reference == baseline.reference else None
 
 
 def write(place: Path, baseline: Baseline) -> Path:
-    """Store a baseline; what was stored of other subjects on the same kind of machine stays."""
+    """Store a baseline in place of what is stored of its kind of machine."""
     path = place / machine.file_name(baseline.machine)
     place.mkdir(parents=True, exist_ok=True)
-    rounded = {name: float(f"{ratio:.4g}") for name, ratio in sorted(baseline.ratios.items())}
-    content = {**cattrs.unstructure(baseline), "ratios": rounded}
+    content = {**cattrs.unstructure(baseline), "ratios": {n: _short(one) for n, one in sorted(baseline.ratios.items())}}
     path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     return path
+
+
+def _short(ratios: Stored) -> Mapping[str, float]:
+    """Four digits: more were not measured."""
+    return {key: float(f"{ratio:.4g}") for key, ratio in cattrs.unstructure(ratios).items()}
 
 
 def matching(stored: Sequence[Baseline], kind: Mapping[str, str], reference: str) -> tuple[Baseline | None, str]:
@@ -139,8 +191,8 @@ def judge(
     """Compare a sitting with the stored ratios; what looks slow is measured again in fresh processes.
 
     One process may be unlucky from beginning to end: where its memory lies, who its neighbours are.
-    So a subject whose first ratio is beyond half of the margin sits again until there are `SITTINGS`,
-    and it is slower if their median is beyond the margin: if most of them agree.
+    So a subject whose first ratio is not below its limit by half of the margin sits again until there
+    are `SITTINGS`, and it is slower if their median is beyond the limit: if most of them agree.
 
     Parameters
     ----------
@@ -149,36 +201,46 @@ def judge(
     """
     ratios = {name: [timing.ratio] for name, timing in first.timings.items()}
     known = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
-    suspects = [n for n, ratio in known.items() if n in ratios and ratios[n][0] > ratio * (1 + margin / 2)]
+    suspects = [n for n, old in known.items() if n in ratios and ratios[n][0] > old.limit(margin) / (1 + margin / 2)]
+    failed = dict(first.failed)
     for _ in range(SITTINGS - 1 if suspects else 0):
-        for name, timing in again(suspects).timings.items():
+        sitting = again(suspects)
+        failed |= sitting.failed
+        for name, timing in sitting.timings.items():
             ratios[name].append(timing.ratio)
-    return [_judged(name, first, ratios.get(name, []), known.get(name), margin) for name in names]
+    return [
+        Judged(name, "failed", None, (), known.get(name), reason=failed.get(name, "not measured"))
+        if name in failed or name not in ratios
+        else _judged(first.timings[name], name, ratios[name], known.get(name), margin)
+        for name in names
+    ]
 
 
-def _judged(name: str, first: Sitting, ratios: Sequence[float], stored: float | None, margin: float) -> Judged:
-    verdict: Verdict = "new"
-    if name in first.failed or not ratios:
-        return Judged(name, "failed", None, (), stored, first.failed.get(name, "not measured"))
-    if stored is not None:
-        change = median(ratios) / stored
-        verdict = "slower" if change > 1 + margin else "faster" if change < 1 / (1 + margin) else "ok"
-    return Judged(name, verdict, first.timings[name], tuple(ratios), stored)
+def _judged(timing: Timing, name: str, ratios: Sequence[float], stored: Stored | None, margin: float) -> Judged:
+    if stored is None:
+        return Judged(name, "new", timing, tuple(ratios))
+    found, limit, middle = median(ratios), stored.limit(margin), stored.middle
+    verdict: Verdict = "slower" if found > limit else "faster" if found < middle**2 / limit else "ok"
+    return Judged(name, verdict, timing, tuple(ratios), stored, limit / middle - 1)
 
 
 def establish(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, progress: Progress = lambda _: None) -> Baseline:
-    """The medians of `UPDATES` fresh processes.
+    """The medians of `UPDATES` fresh processes, and of as many while other work is done on every core.
 
     Raises
     ------
     UserError
         If a subject cannot be measured.
     """
-    sittings = []
-    for number in range(UPDATES):
-        progress(f"process {number + 1} of {UPDATES}")
-        sittings.append(sit(tree, names, rounds))
-        for name, reason in sittings[-1].failed.items():
-            raise UserError(f"{name} cannot be measured: {reason}")
-    ratios = {name: median(one.timings[name].ratio for one in sittings) for name in names}
-    return Baseline(machine.kind(), sittings[0].reference, ratios)
+    sittings: dict[bool, list[Sitting]] = {False: [], True: []}
+    for loaded, done in sittings.items():
+        with load(loaded):
+            for number in range(UPDATES):
+                progress(f"process {number + 1} of {UPDATES}{' with other work on every core' if loaded else ''}")
+                done.append(sit(tree, names, rounds))
+                for name, reason in done[-1].failed.items():
+                    raise UserError(f"{name} cannot be measured: {reason}")
+    ratios = {
+        name: Stored(*(median(one.timings[name].ratio for one in done) for done in sittings.values())) for name in names
+    }
+    return Baseline(machine.kind(), sittings[False][0].reference, ratios)

@@ -22,10 +22,13 @@ class Compilation:
         Method -> processor seconds for what no method before it had compiled.
     reference
         Processor seconds of compiling the frozen reference's inner loop, in the same process.
+    digest
+        Of the reference workload.
     """
 
     seconds: Mapping[str, float]
     reference: float
+    digest: str
 
     @property
     def ratio(self) -> float:
@@ -43,4 +46,4 @@ def compile_all(tree: Tree) -> Compilation:
     """
     with tempfile.TemporaryDirectory(prefix="matbench-kernels-") as place:
         found = run_program(evolve(tree, kernels=Path(place)), "compiling")
-    return Compilation(found["seconds"], found["reference"])
+    return Compilation(found["seconds"], found["reference"], found["digest"])

@@ -103,10 +103,14 @@ class Tree:
 
 
 def environment(tree: Tree) -> dict[str, str]:
-    """Variables of a process that measures: one thread, its own kernels, memory that is kept."""
+    """Variables of a process that measures: one thread, its own kernels, memory that is kept.
+
+    What is said there to pytest is not meant for it; within a test that runs beside others it would time nothing.
+    """
     kept = {"MALLOC_MMAP_THRESHOLD_": _LARGEST, "MALLOC_TRIM_THRESHOLD_": _LARGEST, "PYTHONHASHSEED": "0"}
     threads = dict.fromkeys(_ONE_THREAD, "1")
-    return {**os.environ, **threads, **kept, "NUMBA_CACHE_DIR": str(tree.kernels)}
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    return {**inherited, **threads, **kept, "NUMBA_CACHE_DIR": str(tree.kernels)}
 
 
 def _pytest(tree: Tree, tests: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -67,12 +67,13 @@ def judged(results: Sequence[Judged]) -> Table:
             seconds(one.timing.seconds) if one.timing else one.reason,
             _number(one.ratio, ".4g"),
             _reach(one.timing),
-            _number(one.stored or float("nan"), ".4g"),
+            _number(one.stored.middle, ".4g") if one.stored else "",
             _number(one.change, "+.1%"),
+            _number(one.limit, "+.0%"),
         )
         for one in results
     )
-    heads = "subject", "verdict", "CPU time", "references", "+-", "stored", "change"
+    heads = "subject", "verdict", "CPU time", "references", "+-", "stored", "change", "limit"
     return Table("Times in units of the frozen reference", heads, rows, 2)
 
 

@@ -23,9 +23,10 @@ app = App(
     help_epilogue="""\
 Times mean little on machines that others use, so every method and kernel is measured in turns with a
 frozen reference workload, and what counts is the median of the ratios. What looks slower than the ratio
-stored for this kind of machine is measured again in fresh processes, before it is called so. On a kind of
-machine without stored ratios nothing is judged. Exit status: 0 well, 1 something could not be measured,
-2 wrong usage, 3 slower, or other work than counted before.
+stored for this kind of machine is measured again in fresh processes, before it is called so. Ratios are
+stored without and with other work on every core, as that moves some of them. On a kind of machine without
+stored ratios nothing is judged. Exit status: 0 well, 1 something could not be measured, 2 wrong usage,
+3 slower, or other work than counted before.
 
 **Examples**
 
@@ -53,7 +54,7 @@ class Choice:
     only: Annotated[
         list[str], Parameter(negative="", show_default=False, help="Method, kernel or pattern; may be repeated.")
     ] = field(factory=list)
-    rounds: Annotated[int, Parameter(help="Rounds in a process.")] = 25
+    rounds: Annotated[int, Parameter(help="Rounds in a process; fewer of what takes long.")] = 25
     margin: Annotated[float, Parameter(help="How much slower is a regression: 0.15 is 15 per cent.")] = 0.15
     markdown: Annotated[bool, Parameter(negative="", help="Print tables in Markdown, for a job summary.")] = False
     as_json: Annotated[bool, Parameter(name="--json", negative="", help="Machine-readable.")] = False
@@ -180,7 +181,7 @@ class _Judging:
 
     def update(self, work: bool, compile: bool) -> int:
         """Store counters and ratios."""
-        from matbench.bench import baselines, counting, machine, tables
+        from matbench.bench import baselines, counting, tables
         from matbench.bench.compilation import compile_all
 
         if work:
@@ -189,17 +190,27 @@ class _Judging:
             counting.store(self.tree, counts)
             self.output.table(tables.counters(counts))
         made = baselines.establish(self.tree, self.names, self.choice.rounds, self.progress)
-        before = [one for one in baselines.read(self._folder) if one.machine == machine.kind()]
-        kept = before[0] if before and before[0].reference == made.reference else None
+        kept = baselines.replaced(self._folder, made)
         compilation = kept.compilation if kept else None
         if compile:
             self.progress("compiling all methods without a cache")
             compilation = compile_all(self.tree).ratio
         ratios = {**(kept.ratios if kept and self.choice.only else {}), **made.ratios}
-        path = baselines.write(self._folder, attrs.evolve(made, ratios=ratios, compilation=compilation))
-        self.output.document |= {"stored": str(path), "ratios": ratios, "compilation": compilation}
+        stored = attrs.evolve(made, ratios=ratios, compilation=compilation)
+        path = baselines.write(self._folder, stored)
+        self.output.document |= {"stored": str(path), **attrs.asdict(stored)}
+        self._unsteady(stored)
         self.output.say(f"stored: {path}")
         return DONE
+
+    def _unsteady(self, stored: Any) -> None:
+        """Say whom a slow-down of 1.3 may escape."""
+        names = [name for name in self.names if name in stored.ratios and not stored.ratios[name].steady]
+        if names:
+            self.output.say(
+                f"other load on the machine moves the ratios of {', '.join(names)}: "
+                "their limits are wider, and --base tells smaller differences"
+            )
 
     def check(self, work: bool, compile: bool) -> int:
         """Both layers, and compilation if it is asked for."""
@@ -213,6 +224,9 @@ class _Judging:
 
         self.progress("counting work")
         now = counting.counted(self.tree)
+        if not now:
+            self.output.say("no work was counted")
+            return FAILED
         changed = counting.changes(counting.stored(self.tree), now)
         self.output.document["work"] = {"counters": now, "changes": changed}
         for line in changed:
@@ -232,7 +246,7 @@ class _Judging:
 
         def again(suspects: Sequence[str]) -> Any:
             self.progress(f"again, in a fresh process: {', '.join(suspects)}")
-            return sit(self.tree, suspects, 2 * self.choice.rounds)
+            return sit(self.tree, suspects, self.choice.rounds)
 
         results = baselines.judge(self.names, stored, first, again, self.choice.margin)
         self.output.document |= {
@@ -245,12 +259,16 @@ class _Judging:
         slower = [one for one in results if one.verdict == "slower"]
         if stored is None:
             self.output.say(f"not judged: {why}; matbench bench --update stores one")
+        else:
+            self._unsteady(stored)
         for one in slower:
             agreed = " ".join(f"{ratio:.4g}" for ratio in one.ratios)
-            self.output.say(f"slower: {one.name} by {one.change:.1%} (stored {one.stored:.4g}, measured {agreed})")
+            self.output.say(
+                f"slower: {one.name} by {one.change:.1%} (stored {one.stored.middle:.4g}, measured {agreed})"
+            )
         if len(failed) == len(results):
             self.output.say("nothing was measured")
-        return REGRESSION if slower else FAILED if failed else DONE
+        return REGRESSION if slower else DONE if results and not failed else FAILED
 
     def _compilation(self) -> int:
         from statistics import median
@@ -260,7 +278,7 @@ class _Judging:
 
         self.progress("compiling all methods without a cache")
         found = compile_all(self.tree)
-        stored = next((one for one in baselines.read(self._folder) if one.machine == machine.kind()), None)
+        stored, _ = baselines.matching(baselines.read(self._folder), machine.kind(), found.digest)
         budget = stored.compilation if stored else None
         ratios = [found.ratio]
         while budget is not None and ratios[0] > BUDGET * budget and len(ratios) < baselines.SITTINGS:

@@ -35,7 +35,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     wanted = config.getoption("--subject", [])
     if wanted:
         items[:] = [item for item in items if _subject(item) in wanted]
-    items.sort(key=_part)
+    if config.getoption("--parts", 1) > 1:
+        items.sort(key=_part)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -13,6 +13,8 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from reference import Reference
 
 SLICE = 0.004  # seconds that a subject takes at least in a round: long for the timer, short for most disturbances
+AROUND = 0.02  # seconds that the reference takes at most in a round, before and after the subject together
+PART, FEWEST = 0.25, 5  # seconds after which a part has rounds enough of a long subject, but never fewer rounds
 
 Work = Callable[[], object]
 
@@ -34,9 +36,10 @@ def measure(benchmark: BenchmarkFixture, work: Work, reference: Reference, round
     """Benchmark a subject; the ratio of every round and what it was measured with go to ``extra_info``."""
     work()  # compiled, and its memory touched
     reference()
-    calls = calls_in(work, SLICE)
-    slice_ = min(timed(work, calls) for _ in range(2))
-    around = calls_in(reference, slice_ / 2)
+    call = min(timed(work, 1) for _ in range(3))
+    calls = max(1, round(SLICE / max(call, 1e-6)))
+    around = calls_in(reference, min(calls * call, AROUND) / 2)
+    enough = max(FEWEST, round(PART / (calls * call)))
     before: list[float] = []
     after: list[float] = []
 
@@ -52,7 +55,7 @@ def measure(benchmark: BenchmarkFixture, work: Work, reference: Reference, round
         subject,
         setup=reference_before,
         teardown=lambda: after.append(timed(reference, around)),
-        rounds=rounds,
+        rounds=min(rounds, enough),
     )
     if benchmark.disabled:
         return

@@ -1,31 +1,35 @@
 """Is a slow-down of 1.3 caught, and unchanged code left in peace? Counts both, with `matbench bench` itself.
 
-    python tests/benchmarks/prove.py --tries 20
-    python tests/benchmarks/prove.py --tries 20 --load
+    python tests/benchmarks/prove.py --tries 20 --folder ../proof
+    python tests/benchmarks/prove.py --tries 20 --folder ../proof --load
+    python tests/benchmarks/prove.py --tries 5 --folder ../proof --load --only base
 
 The checkout is copied, and ratios are stored from the copy. Then, in turns: the unchanged copy is measured
 with all subjects, and any alarm is a false one; and copies in whose source a kernel does 30 % more of its
-own work are measured, which must be caught. With ``--load``, meanwhile one process per core streams
-memory; ratios are stored before the load begins, as they are in life. The last line is JSON. With
-``--folder DIR`` copies and ratios stay there, and a second call (with ``--load``, say) is judged by the same.
+own work are measured, which must be caught. Kernels whose ratios load moves too far are left out and named:
+``--only base`` measures each planted copy, and a second unchanged one, against the unchanged copy in turns,
+as `matbench bench --base` does. With ``--load``, meanwhile one process per core streams memory. The last
+line is JSON. With ``--folder DIR`` copies and ratios stay there, for the calls that follow: delete it when
+the code has changed.
 """
 
 import argparse
 import json
-import multiprocessing
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-import numpy as np
+from matbench.bench import baselines
+from matbench.bench.base import compare
+from matbench.bench.load import load
+from matbench.bench.measuring import Tree
 
 HERE = Path(__file__).resolve().parents[2]
 FOLDERS = ("algorithms", "datasets", "reports", "matbench", "tests")
@@ -89,13 +93,12 @@ PLANTS = (
         ),
     ),
     Plant(
-        "pass",
-        "algorithms/materiality/passes.py",
+        "passes",
+        "algorithms/materiality/rows.py",
         (
             (
-                "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n",
-                "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n"
-                "        over_rows(borrow, (self.space.rows * 3 + 9) // 10, threads, share(self.space.rows, threads))\n",
+                "        for number in range(len(course)):\n",
+                f"        for turn in {_again('len(course)')}:\n            number = turn % len(course)\n",
             ),
         ),
     ),
@@ -111,14 +114,18 @@ def copy_checkout(to: Path, plant: Plant | None = None) -> Path:
         shutil.copytree(HERE / name, to / name, symlinks=True, ignore=hidden)
     shutil.copy(HERE / "pyproject.toml", to)
     if plant is not None:
-        path = to / plant.file
-        text = path.read_text(encoding="utf-8")
-        for before, after in plant.changes:
-            if text.count(before) != 1:
-                raise SystemExit(f"{plant.file} has changed: mend what PLANTS says of {plant.subject!r}")
-            text = text.replace(before, after)
-        path.write_text(text, encoding="utf-8")
+        (to / plant.file).write_text(planted(plant), encoding="utf-8")
     return to
+
+
+def planted(plant: Plant) -> str:
+    """The source file with the slow-down in it."""
+    text = (HERE / plant.file).read_text(encoding="utf-8")
+    for before, after in plant.changes:
+        if text.count(before) != 1:
+            raise SystemExit(f"{plant.file} has changed: mend what PLANTS says of {plant.subject!r}")
+        text = text.replace(before, after)
+    return text
 
 
 def bench(code: Path, cache: Path, *arguments: str) -> tuple[int, dict[str, Any]]:
@@ -136,81 +143,102 @@ def bench(code: Path, cache: Path, *arguments: str) -> tuple[int, dict[str, Any]
     return done.returncode, json.loads(done.stdout)
 
 
-def _stream() -> None:
-    a, b = np.ones((2, 1 << 24), np.float32)
-    while True:
-        np.multiply(a, 1.0001, out=b)
-        np.add(b, a, out=a)
-        np.minimum(a, 1, out=a)
-
-
-@contextmanager
-def load(wanted: bool) -> Iterator[None]:
-    """Other work on every core: memory streamed, 128 MiB a process."""
-    others = [multiprocessing.Process(target=_stream, daemon=True) for _ in range((os.cpu_count() or 1) * wanted)]
-    for other in others:
-        other.start()
-    try:
-        yield
-    finally:
-        for other in others:
-            other.kill()
-            other.join()
-
-
 def _slower(found: dict[str, Any]) -> dict[str, float]:
     return {one["name"]: one["change"] for one in found["times"] if one["verdict"] == "slower"}
+
+
+class Proof:
+    """Copies of the code in a folder, and the ratios that are stored of the unchanged one."""
+
+    def __init__(self, place: Path, margin: str):
+        self._place, self._cache = place, place / "cache"
+        self._stored = ("--baselines", str(place / "baselines"))
+        self._judged = ("--no-work", "--margin", margin, *self._stored)
+        self.clean = copy_checkout(place / "clean")
+        if not (place / "baselines").is_dir():
+            print("storing ratios of the unchanged copy, without and with load", flush=True)
+            bench(self.clean, self._cache, "--update", "--no-work", *self._stored)
+        (stored,) = baselines.read(place / "baselines")
+        self.steady = [plant for plant in PLANTS if stored.ratios[plant.subject].steady]
+        for plant in PLANTS:
+            ratio = stored.ratios[plant.subject]
+            left = "" if plant in self.steady else ": left to --only base"
+            print(f"{plant.subject:12} with load {ratio.loaded / ratio.quiet - 1:+.1%}{left}", flush=True)
+        self._planted = {
+            plant.subject: copy_checkout(place / plant.subject.replace(" ", "-"), plant) for plant in PLANTS
+        }
+
+    def compile(self, plants: Sequence[Plant]) -> None:
+        """Before anything is counted."""
+        for plant in plants:
+            self.catch(plant, "--rounds", "5")
+
+    def catch(self, plant: Plant, *more: str) -> dict[str, Any]:
+        """Measure a planted copy once."""
+        code = self._planted[plant.subject]
+        _, found = bench(code, self._cache, "--only", plant.subject, *more, *self._judged)
+        (one,) = found["times"]
+        return {"subject": plant.subject, "caught": one["verdict"] == "slower", "change": one["change"]}
+
+    def alarms(self) -> tuple[dict[str, float], float]:
+        """Measure the unchanged copy once: what is called slower, and the greatest change."""
+        _, found = bench(self.clean, self._cache, *self._judged)
+        return _slower(found), max(one["change"] for one in found["times"])
+
+    def against(self, plant: Plant | None, subject: str) -> dict[str, Any]:
+        """Measure a planted copy, or a second unchanged one, against the unchanged copy in turns."""
+        code = self._planted[subject] if plant else copy_checkout(self._place / "twin")
+        trees = [Tree(each, Path(sys.executable), self._place / "kernels" / each.name) for each in (code, self.clean)]
+        (found,) = compare(*trees, [subject], progress=lambda _: None)
+        verdict = found.verdict(baselines.MARGIN)
+        return {"subject": subject, "caught": verdict == "slower", "change": found.ratio - 1, "low": found.low - 1}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tries", type=int, default=20, help="of either kind")
     parser.add_argument("--load", action="store_true", help="with other work on every core")
-    parser.add_argument("--only", choices=("caught", "alarms"), help="one of the two counts")
+    parser.add_argument(
+        "--only", choices=("caught", "alarms", "base"), help="one of the two counts, or those of --base"
+    )
     parser.add_argument("--folder", type=Path, help="keep copies and ratios there; default: nothing is kept")
-    parser.add_argument("--margin", default="0.15")
+    parser.add_argument("--margin", default=str(baselines.MARGIN))
     asked = parser.parse_args()
     if asked.tries < 1:
         parser.error(f"--tries {asked.tries}: at least 1")
-    began = time.monotonic()
     catches: list[dict[str, Any]] = []
-    alarms: list[dict[str, float]] = []
+    alarms: list[Mapping[str, float]] = []
     worst: list[float] = []
     with tempfile.TemporaryDirectory(prefix="matbench-proof-") as passing:
-        place = (asked.folder or Path(passing)).resolve()
-        cache = place / "cache"
-        stored = ("--baselines", str(place / "baselines"))
-        clean = copy_checkout(place / "clean")
-        if not (place / "baselines").is_dir():
-            print("storing ratios of the unchanged copy", flush=True)
-            few = [f"--only={plant.subject}" for plant in PLANTS if asked.only == "caught"]
-            bench(clean, cache, "--update", "--no-work", *few, *stored)
-        planted = {p.subject: copy_checkout(place / p.subject.replace(" ", "-"), p) for p in PLANTS}
-        judged = ("--no-work", "--margin", asked.margin, *stored)
-        if asked.only != "alarms":
-            for subject, code in planted.items():  # compiled before anything is counted
-                bench(code, cache, "--only", subject, "--rounds", "5", *judged)
+        proof = Proof((asked.folder or Path(passing)).resolve(), asked.margin)
+        plants: Sequence[Plant] = PLANTS if asked.only == "base" else proof.steady
+        if asked.only in (None, "caught"):
+            proof.compile(plants)
+        began = time.monotonic()
         with load(asked.load):
             for number in range(asked.tries):
-                if asked.only != "alarms":
-                    plant = PLANTS[number % len(PLANTS)]
-                    status, found = bench(planted[plant.subject], cache, "--only", plant.subject, *judged)
-                    one = found["times"][0]
-                    catches.append({"subject": plant.subject, "caught": status == 3, "change": one["change"]})
-                    print(
-                        f"{number + 1:3} planted in {plant.subject:12} {one['change']:+.1%} {one['verdict']}",
-                        flush=True,
-                    )
+                if asked.only != "alarms" and plants:
+                    plant = plants[number % len(plants)]
+                    one = proof.against(plant, plant.subject) if asked.only == "base" else proof.catch(plant)
+                    catches.append(one)
+                    said = "caught" if one["caught"] else "missed"
+                    print(f"{number + 1:3} planted in {plant.subject:12} {one['change']:+.1%} {said}", flush=True)
+                if asked.only == "base":
+                    one = proof.against(None, plants[number % len(plants)].subject)
+                    alarms.append({one["subject"]: one["change"]} if one["caught"] else {})
+                    worst.append(one["change"])
+                elif asked.only != "caught":
+                    found, change = proof.alarms()
+                    alarms.append(found)
+                    worst.append(change)
                 if asked.only != "caught":
-                    _, found = bench(clean, cache, *judged)
-                    alarms.append(_slower(found))
-                    worst.append(max(one["change"] for one in found["times"]))
                     said = ", ".join(alarms[-1]) or "no alarm"
                     print(f"{number + 1:3} unchanged: {said}; the slowest {worst[-1]:+.1%}", flush=True)
     changes = {p.subject: [c["change"] for c in catches if c["subject"] == p.subject] for p in PLANTS}
     summary = {
         "load": asked.load,
         "tries": asked.tries,
+        "left_to_base": [plant.subject for plant in PLANTS if plant not in plants],
         "caught": sum(c["caught"] for c in catches),
         "planted": len(catches),
         "measured": {name: median(found) for name, found in changes.items() if found},

@@ -1,6 +1,7 @@
 """Layer two: every method and kernel against the frozen reference.
 
-Without more, a few rounds that show that every subject works; `matbench bench` asks for as many as a
+Without more, a few rounds that show that every subject works; where tests run side by side, which
+switches pytest-benchmark off, a few calls show it. `matbench bench` asks for as many rounds as a
 judgement takes, by ``--benchmark-min-rounds``, in several parts: what disturbs a subject for some
 seconds does not disturb it in all of them. It reads what the fixture writes.
 """
