@@ -68,6 +68,7 @@ app = App(
 """,
     help_format="markdown",
     version=__version__,
+    suppress_keyboard_interrupt=False,  # `main` says so
 )
 
 Data = Annotated[
@@ -263,7 +264,7 @@ def compare(
         repeats=_whole("repeats", options.repeats),
         write=not options.dry_run,
     )
-    return running.show_plan(ready) if options.dry_run else running.work(ready, options)
+    return running.show_plan(ready, options) if options.dry_run else running.work(ready, options)
 
 
 @app.command(help_epilogue="")
@@ -316,7 +317,7 @@ def ablate(
         write=not options.dry_run,
     )
     if options.dry_run:
-        return running.show_plan(ready)
+        return running.show_plan(ready, options)
     return running.work(ready, options, is_ablation=any(ablation.factors(chosen).values()))
 
 

@@ -22,7 +22,7 @@ from uuid import uuid4
 
 from attrs import define, evolve, frozen
 
-from matbench import parcels, plugins
+from matbench import parcels, plugins, spec
 from matbench.errors import UserError
 from matbench.keeper import Keeper
 from matbench.limits import cores
@@ -30,7 +30,7 @@ from matbench.plan import Cell, Plan
 from matbench.scenes import data_root, load_scene
 from matbench.settings import Settings
 from matbench.spec import first_line
-from matbench.store import Outcome, Store, write_cell
+from matbench.store import Outcome, Store
 from matbench.unzip import ArchiveError
 from matbench.worker import Job
 
@@ -44,10 +44,13 @@ class Task:
 
     Parameters
     ----------
+    run
+        Distinguishes what belongs to one run from all else on the cluster.
     files
         Name and content of the users' own files that hold methods.
     """
 
+    run: str
     cell: Cell
     files: tuple[tuple[str, bytes], ...]
     settings: Settings
@@ -92,30 +95,42 @@ def work(
         from distributed import as_completed
 
         arriving = as_completed(loop=client.loop, with_results=True, raise_errors=False)
-        this_run = uuid4().hex
+        this_run = f"matbench-{uuid4().hex}"
+        waiting = {cell.key: cell for cell in todo}
+        telling = Lock()  # that a cell starts is heard in a thread of the client
         tasks: dict[str, tuple[Task, list[Reply]]] = {}
         futures: dict[str, Any] = {}
 
+        def begins(key: str) -> None:
+            with telling:
+                if (cell := waiting.pop(key, None)) is not None:
+                    tell("start", cell, None)
+
+        def ends(cell: Cell, outcome: Outcome) -> None:
+            begins(cell.key)
+            with telling:
+                tell("done", cell, outcome)
+
         def submit(task: Task, before: list[Reply]) -> None:
             chosen = {"workers": _others(client, before), "allow_other_workers": True} if before else {}
-            future = client.submit(
-                solve, task, key=("matbench", this_run, task.cell.key, len(before)), pure=False, **chosen
-            )
+            future = client.submit(solve, task, key=(this_run, task.cell.key, len(before)), pure=False, **chosen)
             tasks[future.key], futures[future.key] = (task, before), future
             arriving.add(future)
 
+        client.subscribe_topic(this_run, lambda event: begins(event[1]))
         try:
             for cell in todo:
-                submit(Task(cell, files, settings), [])
-                tell("start", cell, None)
+                submit(Task(this_run, cell, files, settings), [])
             for future, reply in arriving:
                 task, before = tasks.pop(future.key)
                 del futures[future.key]
                 if future.status == "finished" and reply.declined and _others(client, [*before, reply]):
                     submit(task, [*before, reply])
                     continue
-                tell("done", task.cell, _arrived(store, task.cell, future, reply, before))
+                ends(task.cell, _arrived(store, task.cell, future, reply, before))
         finally:
+            with telling:
+                waiting.clear()
             client.cancel(list(futures.values()), force=True)
 
 
@@ -128,25 +143,21 @@ def _others(client: Any, declined: Sequence[Reply]) -> list[str]:
 
 
 def _arrived(store: Store, cell: Cell, future: Any, reply: Any, before: Sequence[Reply]) -> Outcome:
-    """Put what came in its place, or say in the cell why nothing came."""
+    """Put what came in its place, or say why nothing came."""
+    wrong = Outcome("failed", alone=False)
     if future.status == "finished" and not reply.declined:
         try:
             return parcels.put(store, cell, reply.parcel)
         except (ArchiveError, OSError) as error:
-            return Outcome("failed", reason=f"its cell could not be written: {error}")
+            return evolve(wrong, reason=f"its cell could not be written: {error}")
     if future.status == "finished":
         every = {one.declined: one.worker for one in [*before, reply]}
-        outcome = Outcome("failed", reason="; ".join(f"{why} ({worker})" for why, worker in every.items()))
-    elif future.status == "cancelled":
-        outcome = Outcome("interrupted", reason="the cluster has dropped it")
-    else:
-        failure = reply[1] if isinstance(reply, tuple) else reply
-        said = f"{type(failure).__name__}: {first_line(failure)}"
-        outcome = Outcome("crashed", reason=f"no worker finished it: {said}")
-    with suppress(OSError), store.building(cell) as draft:
-        write_cell(draft, cell, evolve(outcome, alone=False))
-        (draft / "log.txt").write_text("")
-    return outcome
+        return evolve(wrong, reason="; ".join(f"{why} ({worker})" for why, worker in every.items()))
+    if future.status == "cancelled":
+        return evolve(wrong, status="interrupted", reason="the cluster has dropped it")
+    failure = reply[1] if isinstance(reply, tuple) else reply
+    said = f"{type(failure).__name__}: {first_line(failure)}"
+    return evolve(wrong, status="crashed", reason=f"no worker finished it: {said}")
 
 
 @contextmanager
@@ -197,6 +208,7 @@ def solve(task: Task) -> Reply:
         why = _unlike(task.cell, files, root)
         if why:
             return Reply(worker.address, declined=why)
+        worker.log_event(task.run, task.cell.key)
         at_once = worker.state.nthreads
         settings = evolve(
             task.settings,
@@ -244,10 +256,11 @@ class Keepers:
         """A free one, or a new one."""
         with suppress(Empty):
             return self.free.get_nowait()
+        from matbench.provenance import commit_known
         from matbench.run import kernels_kept, without_main
 
         # Dask's workers are daemons, which may have no children lest they leave orphans; keepers end with their parent
-        with self.starting, without_main(), kernels_kept():
+        with self.starting, without_main(), kernels_kept(), commit_known():
             config = current_process()._config  # type: ignore[attr-defined]
             before = config.get("daemon")
             config["daemon"] = False
@@ -299,13 +312,13 @@ def _unlike(cell: Cell, files: Sequence[str], root: Path | None) -> str:
     name, known = cell.method.algorithm, plugins.installed("algorithms")
     candidates = [plugins.Plugin(name, file, object) for file in files]
     candidates += [known[name]] if name in known else []
-    try:
-        digests = [plugins.code_digest(one) for one in candidates]
-    except (ImportError, OSError) as error:
-        return f"{name} cannot be read: {error}"
-    if not digests:
+    if not candidates:
         return f"the worker has no method {name}: install what offers it there"
-    if cell.method.code not in digests:
+    try:
+        is_same = cell.method.code in map(plugins.code_digest, candidates) or cell.method.code == _code(cell, files)
+    except (ImportError, OSError, UserError) as error:
+        return f"the worker cannot use {name}: {first_line(error)}"
+    if not is_same:
         return f"the worker has other code of {name}, or other versions of numpy, numba or OpenCV: install the same"
     try:
         if _digest(cell.scene, root) != cell.scene_digest:
@@ -313,6 +326,12 @@ def _unlike(cell: Cell, files: Sequence[str], root: Path | None) -> str:
     except Exception as error:
         return f"the worker has not {cell.scene}: {first_line(error)}"
     return ""
+
+
+def _code(cell: Cell, files: Sequence[str]) -> str:
+    """The digest of a cell's method, and of the files that it names: to know these, the method is imported."""
+    plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in files])
+    return plugins.method_digest(plugin, spec.build(plugin.name, plugin.load(), cell.method.params))
 
 
 @cache

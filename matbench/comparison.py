@@ -81,8 +81,6 @@ class Comparison:
                     work.start(cell.key)
                 else:
                     work.end(cell.key)
-                    if outcome is not None and self.store.outcome(cell, whole=False) is None:  # it was not kept
-                        self.store.try_out()
                 tell(event, cell, outcome)
 
             try:
@@ -96,6 +94,7 @@ class Comparison:
         results = scoring.results(self.plan, self.store, self.scenes)
         cells = scoring.cells(self.plan, self.store)
         with locked(self.folder):
+            self.store.sweep()
             for name, table in (("results.csv", results), ("cells.csv", cells)):
                 write_text(self.folder / name, table.to_csv(index=False))
             scorer.record(self.plan, self.store, self.scenes)

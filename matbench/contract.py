@@ -2,22 +2,22 @@
 
 import os
 import tempfile
+import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import TimeoutError as FutureTimeout
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from functools import cache
 from hashlib import sha256
-from multiprocessing import get_context
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
-from pebble import ProcessExpired, ProcessPool
 
-from matbench import plugins, spec
+from matbench import plugins, processes, spec
 from matbench.algorithm import Context
 from matbench.plan import Method
 from matbench.run import kernels_kept, without_main
@@ -29,6 +29,7 @@ from matbench.worker import checked, hide_truth
 
 Verdict = Literal["pass", "fail", "skipped", "note"]
 
+_TICK = 0.05  # seconds between two looks at a process
 ALIKE = 0.99  # share of a map's pixels that must agree
 EASY, EITHER_SIGN = "synthetic/box[n=5 ref=1]", "synthetic/curved[n=5 ref=1]"
 """Textured scenes of 240x180 px. The reference view is not in the middle: the field's pair has only one
@@ -212,31 +213,67 @@ def _where(error: BaseException) -> str:
     return outside[-1] if outside else ""
 
 
-@contextmanager
-def _processes(module: str | None) -> Iterator[ProcessPool]:
-    context = get_context("forkserver")
-    context.set_forkserver_preload(["matbench.contract", *([module] if module else [])])
-    with without_main(), kernels_kept(), ProcessPool(max_workers=1, max_tasks=1, context=context) as pool:
+def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Path], trial: Trial, log: Path) -> None:
+    """Have a process below this one solve a trial, send its answer, and end it with all that it has started."""
+    processes.stand_apart()  # Ctrl-C is for whoever holds the line
+    answers, theirs = Pipe(duplex=False)
+    watcher, pid = os.getpid(), os.fork()
+    if not pid:
         try:
-            yield pool
-        except BaseException:
-            pool.stop()
-            pool.join()
-            raise
+            processes.die_with_parent(watcher)
+            for ours in (line, answers):
+                ours.close()
+            processes.confine(processes.room())
+            own, found = os.getpid(), solve(method, files, trial, log)
+            if os.getpid() == own:  # no copy that the method has made of its process
+                theirs.send(found)
+                os._exit(0)
+        finally:
+            os._exit(1)
+    theirs.close()
+    try:
+        with suppress(OSError):  # nobody wants it any more
+            line.send(_heard(answers, line, pid, timeout))
+    finally:
+        processes.end_all_below()
 
 
-def answer(pool: ProcessPool, method: Method, files: Sequence[Path], trial: Trial, timeout: float) -> Answer:
-    """Solve one trial in a process of its own, which may hang or end as it likes."""
+def _heard(answers: Connection, line: Connection, pid: int, timeout: float) -> Answer:
+    """What a process that solves a trial has answered, or what became of it."""
+    end, sources = time.monotonic() + timeout, [answers, line]
+    while time.monotonic() < end:
+        ended = processes.reap().get(pid)
+        ready = wait(sources, _TICK if ended is None else 0)
+        if line in ready:
+            return Answer(error="nobody wants to know")
+        if answers in ready:
+            try:
+                found: Answer = answers.recv()
+                return found
+            except EOFError:
+                sources.remove(answers)
+        if ended is not None:
+            code = os.waitstatus_to_exitcode(ended)
+            how = f"signal {-code}" if code < 0 else f"exit status {code}"
+            return Answer(error=f"the method ended its process ({how})")
+    return Answer(error=f"no answer within {timeout:g} s")
+
+
+def answer(method: Method, files: Sequence[Path], trial: Trial, timeout: float) -> Answer:
+    """Solve one trial in a process of its own, which may hang, end as it likes, or leave others behind."""
     with tempfile.TemporaryDirectory(prefix="matbench-check-") as folder:
         log = Path(folder) / "log.txt"
-        future = pool.schedule(solve, args=[method, files, trial, log], timeout=timeout)
+        line, theirs = Pipe()
+        process = get_context("forkserver").Process(target=_watch, args=(theirs, timeout, method, files, trial, log))
+        process.start()
+        theirs.close()
         try:
-            found: Answer = future.result()
-        except FutureTimeout:
-            found = Answer(error=f"no answer within {timeout:g} s")
-        except ProcessExpired as error:
-            how = f"signal {-error.exitcode}" if (error.exitcode or 0) < 0 else f"exit status {error.exitcode}"
-            found = Answer(error=f"the method ended its process ({how})")
+            found: Answer = line.recv()
+        except EOFError:
+            found = Answer(error="the method ended the process that watches it")
+        finally:
+            line.close()
+            process.join()
         said = log.read_bytes()[-2000:].decode("utf-8", "replace").strip() if log.exists() else ""
         return evolve(found, output=said)
 
@@ -260,11 +297,13 @@ def check(
     """
     entry = plugins.algorithm(method.algorithm, files).entry
     wanted, answers = trials(), {}
-    with _processes(None if isinstance(entry, type) else entry.module) as pool:
+    module = [] if isinstance(entry, type) else [entry.module]
+    with without_main(), kernels_kept():
+        processes.start_server(["matbench.contract", *module])
         for done, (name, trial) in enumerate(wanted.items()):
             if listen is not None:
                 listen(done, len(wanted), name)
-            answers[name] = answer(pool, method, files, trial, timeout)
+            answers[name] = answer(method, files, trial, timeout)
             if answers["easy"].error.startswith("no answer within"):
                 break
     untried = Answer(reason="not tried, as the first answer did not come")

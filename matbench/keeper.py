@@ -6,6 +6,7 @@ folder is the keeper's: whatever becomes of the method, log and outcome are writ
 and ends all below it, as soon as nobody holds the other end of its line, so nothing outlives a run.
 """
 
+import json
 import os
 import shutil
 import signal
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 LOG_ENDS = 1 << 16  # bytes kept of the beginning, and of the end, of what a cell prints
 _TICK = 0.05  # seconds between two looks at a process
-_TREE_TICKS = 10  # every so many ticks also at those that it started
+_TREE_LOOKS = 10  # every so many looks also at those that it started
 _LAST_WORDS = 0.5  # seconds that a process which is ended has to say where it was
 _PATIENCE = 5.0  # seconds that a keeper has to clear away
 
@@ -77,12 +78,23 @@ class Log:
 
 @define
 class Child:
-    """The process that runs methods, seen from its keeper."""
+    """The process that runs methods, seen from its keeper.
+
+    Parameters
+    ----------
+    first
+        The job by whose settings it is confined.
+    heard
+        What it has said on its line so far. Nobody knows what a method writes there: it is read as text,
+        as far as there is any, and never waited for.
+    """
 
     pid: int
     line: Connection
     output: int
+    first: Job
     is_fit: bool = True
+    heard: bytearray = field(factory=bytearray)
 
     @classmethod
     def fork(cls, job: Job, inbox: Connection) -> "Child":
@@ -103,7 +115,39 @@ class Child:
         theirs.close()
         os.close(printed)
         os.set_blocking(output, False)
-        return cls(pid, line, output)
+        return cls(pid, line, output, job)
+
+    def suits(self, job: Job) -> bool:
+        """Is another job confined as the first one was, and content with a process that is not its own?"""
+        first = self.first
+        same = (job.threads, job.settings.memory_each()) == (first.threads, first.settings.memory_each())
+        return same and job.settings.isolation == "shared"
+
+    def answer(self) -> str | None:
+        """What it says of its cell (`matbench.worker.serve`), None until it has said all of it.
+
+        Raises
+        ------
+        EOFError
+            If nothing more can come.
+        ValueError
+            If it is no answer.
+        """
+        found = os.read(self.line.fileno(), LOG_ENDS)
+        if not found:
+            raise EOFError
+        self.heard += found
+        if not self.heard.endswith(b"\n"):
+            if len(self.heard) > LOG_ENDS:
+                raise ValueError("no answer is so long")
+            return None
+        try:
+            said, is_fit = json.loads(self.heard)
+        except (TypeError, RecursionError) as error:
+            raise ValueError("no answer") from error
+        self.heard.clear()
+        self.is_fit = is_fit is True
+        return str(said)
 
     def close(self) -> None:
         self.line.close()
@@ -112,10 +156,9 @@ class Child:
 
 def keep(inbox: Connection) -> None:
     """Solve the cells of the jobs that come in, one by one; send "" after each, or why it could not be written."""
-    os.setsid()  # Ctrl-C is for whoever holds the line
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit())
-    processes.adopt_orphans()
+    processes.stand_apart()  # Ctrl-C is for whoever holds the line
     child: Child | None = None
     try:
         while True:
@@ -136,6 +179,10 @@ def keep(inbox: Connection) -> None:
 def _cell(job: Job, inbox: Connection, child: Child | None) -> Child | None:
     """Solve a cell; the child, if it is to solve the next one, too."""
     store = Store(job.run)
+    if child is not None and not child.suits(job):
+        processes.end_all_below()
+        child.close()
+        child = None
     with store.building(job.cell) as draft:
         if child is not None:
             stays = _attempt(job, draft.resolve(), inbox, child)
@@ -192,7 +239,7 @@ def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> 
     sources: list[Any] = [inbox, child.output, child.line]
     with suppress(OSError):  # it has ended already
         child.line.send((job, draft))
-    ticks = 0
+    looks, next_look = 0, begin
     while True:
         ready = wait(sources, _TICK)
         if inbox in ready:
@@ -201,22 +248,27 @@ def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> 
             sources.remove(child.output)
         if child.line in ready:
             try:
-                said, child.is_fit = child.line.recv()
+                said = child.answer()
             except (EOFError, OSError):
                 sources.remove(child.line)
+            except ValueError:
+                return Outcome("crashed", reason="the method wrote into a file of the harness that it had not opened")
             else:
                 if said:
                     raise OSError(said)
-                return None
+                if said is not None:
+                    return None
         if child.pid in (ended := processes.reap()):
             log.drain()
             return _ended(ended[child.pid], log, kills)
-        ticks += not ready
         now = time.monotonic()
         if limit is not None and now - begin > limit:
             _last_words(child, log)
             return Outcome("timeout", reason=f"stopped after {limit:g} s")
-        used = processes.used(child.pid, whole_tree=ticks % _TREE_TICKS == 0)
+        if now < next_look:
+            continue
+        looks, next_look = looks + 1, now + _TICK
+        used = processes.used(child.pid, whole_tree=looks % _TREE_LOOKS == 0)
         if used > memory:
             _last_words(child, log)
             return Outcome("out-of-memory", reason=f"stopped: it held {used:.0f} MiB, {memory} MiB are its limit")
@@ -250,28 +302,28 @@ class Keeper:
     """A keeper's process, from outside; forked from a small server that has imported the libraries once."""
 
     def __init__(self, preload: Iterable[str] = ()) -> None:
-        context = get_context("forkserver")
-        context.set_forkserver_preload(["matbench.keeper", "cv2", "threadpoolctl", *preload])
+        processes.start_server(["matbench.keeper", "cv2", "threadpoolctl", *preload])
         self.line, theirs = Pipe()
-        self._process: ForkServerProcess = context.Process(target=keep, args=(theirs,))
+        self._process: ForkServerProcess = get_context("forkserver").Process(target=keep, args=(theirs,))
         self._process.start()
         theirs.close()
 
     def take(self, job: Job) -> None:
         """Begin with a cell; `line` tells when there is an answer."""
-        with suppress(BrokenPipeError):  # `done` says so
+        with suppress(ConnectionError):  # `done` says so
             self.line.send(job)
 
     def done(self, job: Job) -> tuple[Outcome, bool]:
         """What has become of the cell, and whether this keeper can go on."""
-        lives = True
+        wrong = Outcome("failed", threads=job.threads, alone=job.alone)
         try:
             said = self.line.recv()
         except (EOFError, OSError):
-            lives, said = False, "its keeper was killed"
+            return evolve(wrong, status="crashed", reason="its keeper was killed"), False
         if said:
-            return Outcome("failed", reason=f"its cell could not be written: {said}"), lives
-        return Store(job.run).outcome(job.cell) or Outcome("failed", reason="the cell's process left no result"), lives
+            return evolve(wrong, reason=f"its cell could not be written: {said}"), True
+        found = Store(job.run).outcome(job.cell)
+        return found or evolve(wrong, reason="the cell's process left no result"), True
 
     def dismiss(self) -> None:
         """Tell it to stop whatever it does and clear away; `wait` waits for that."""

@@ -6,6 +6,7 @@ import platform
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from math import isfinite
 from pathlib import Path
 from threading import get_ident
 
@@ -62,7 +63,9 @@ class Work:
         try:
             found = json.loads((folder / WORK).read_text(encoding="utf-8"))
             running = {str(key): float(begun) for key, begun in found["running"].items()}
-            return cls(folder, int(found["pid"]), str(found["host"]), float(found["since"]), running)
+            work = cls(folder, int(found["pid"]), str(found["host"]), float(found["since"]), running)
+            is_plain = work.host.isprintable() and all(map(isfinite, (work.since, *running.values())))
+            return work if is_plain else None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return None
 

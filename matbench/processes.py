@@ -5,8 +5,9 @@ import os
 import resource
 import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from multiprocessing import forkserver, get_context
 from pathlib import Path
 
 import psutil
@@ -90,8 +91,23 @@ def use_threads(count: int) -> None:
         os.environ["NUMBA_NUM_THREADS"] = str(count)
 
 
-def adopt_orphans() -> None:
-    """Become the parent of whatever the processes below this one leave behind (Linux)."""
+def start_server(preload: Iterable[str]) -> None:
+    """Start the server that processes are forked from, unless it runs already.
+
+    It is not interrupted by Ctrl-C while it imports what is to be there in all of them.
+    """
+    get_context("forkserver").set_forkserver_preload(list(preload))
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def stand_apart() -> None:
+    """Lead a session, which Ctrl-C does not reach, and adopt what the processes below leave behind (Linux)."""
+    os.setsid()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # `start_server` has it blocked
     _prctl(_CHILD_SUBREAPER, 1)
 
 

@@ -66,7 +66,7 @@ def commit_known() -> Iterator[None]:
     try:
         yield
     finally:
-        del os.environ[_COMMIT]
+        os.environ.pop(_COMMIT, None)
 
 
 def combined(found: Iterable[Mapping[str, str]]) -> dict[str, str]:

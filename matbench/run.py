@@ -13,7 +13,7 @@ from matbench import plugins
 from matbench.keeper import Keeper, dismiss
 from matbench.plan import Cell, Plan
 from matbench.settings import Settings
-from matbench.store import Outcome, Store
+from matbench.store import Outcome, Store, write_cell
 from matbench.todo import pending
 from matbench.worker import Job
 
@@ -63,6 +63,11 @@ def run(
     (`matbench.cluster`); whatever a method does costs that cell alone. `KeyboardInterrupt` ends
     the cells under way and is passed on; what is finished stays.
 
+    Raises
+    ------
+    FolderLost
+        If cells cannot be written.
+
     Parameters
     ----------
     preload
@@ -70,7 +75,16 @@ def run(
     listen
         Told as each cell starts and ends.
     """
-    tell = listen or (lambda *_: None)
+    told = listen or (lambda *_: None)
+
+    def tell(event: Event, cell: Cell, outcome: Outcome | None) -> None:
+        if outcome is not None and store.outcome(cell, whole=False) != outcome:  # what was solved could not be kept
+            store.try_out()
+            with store.building(cell) as draft:
+                write_cell(draft, cell, outcome)
+                (draft / "log.txt").touch()
+        told(event, cell, outcome)
+
     todo = pending(plan, store, settings)
     if not todo:
         return

@@ -10,11 +10,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from errno import EISDIR, ELOOP, ENOENT, ENOTDIR, ENOTEMPTY
 from hashlib import sha256
+from math import isfinite
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve, field, frozen
 from cattrs.preconf.json import make_converter
 from numpy.typing import NDArray
 
@@ -31,9 +32,15 @@ KEY = re.compile(r"[0-9a-f]{16}")
 """What a cell's folder is called."""
 _DRAFT = re.compile(r"\.([0-9a-f]{16}|removed)\.\w+")
 _ABSENT = (ENOENT, ENOTDIR, EISDIR, ELOOP)
+_LONGEST = 2000  # characters of a reason
 _MAP_BYTES = 1 << 32  # of all maps of a cell, unpacked
 
 _json = make_converter()
+
+
+def _one_line(text: str) -> str:
+    """What a method, or whoever wrote a run folder, has to say, as one line that can be printed."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:_LONGEST].rstrip()
 
 
 @frozen
@@ -69,7 +76,7 @@ class Outcome:
     warmup_seconds: float | None = None
     peak_mb: float | None = None
     threads: int | None = None
-    reason: str = ""
+    reason: str = field(default="", converter=_one_line)
     has_volume: bool = False
     work: Mapping[str, int] = {}
     history: Mapping[str, list[float | None]] = {}
@@ -248,6 +255,9 @@ class Store:
         try:
             facts = json.loads((self.cell(cell) / "cell.json").read_text(encoding="utf-8"))
             outcome = _json.structure(facts["outcome"], Outcome)
+            numbers = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb)
+            if not all(isfinite(number) for number in numbers if number is not None):
+                return None
             if whole and outcome.status == "ok":
                 maps = self.disparity(cell)
                 if outcome.maps and maps_digest(maps) != outcome.maps:

@@ -2,6 +2,7 @@
 
 import ctypes
 import faulthandler
+import json
 import os
 import resource
 import signal
@@ -217,7 +218,8 @@ def _what_failed(error: BaseException) -> tuple[Status, str]:
 def serve(line: Connection, printed: int, job: Job) -> None:
     """Solve the cells that come in, one by one. Never returns.
 
-    The answer to each is "", or why it could not be written, and whether this process is fit for another one.
+    The answer to each is a line of JSON: "", or why it could not be written, and whether this process is fit
+    for another one.
 
     Parameters
     ----------
@@ -247,7 +249,7 @@ def serve(line: Connection, printed: int, job: Job) -> None:
             except OSError as error:
                 said, is_fit = f"{type(error).__name__}: {error}", False
             _flush()
-            line.send((said, is_fit))
+            os.write(line.fileno(), json.dumps([said, is_fit]).encode() + b"\n")
             os.environ.clear()
             os.environ.update(environment)
     os._exit(0)

@@ -4,11 +4,13 @@ import ctypes
 import multiprocessing
 import os
 import signal
+import stat
 import subprocess
 import sys
 import threading
 import time
 from collections import deque
+from contextlib import suppress
 from itertools import repeat
 from pathlib import Path
 
@@ -75,7 +77,7 @@ class Allocates(_Rough):
 
 
 class Grows(_Rough):
-    """Takes more and more, a little at a time, in a process that it starts."""
+    """Takes more and more, a little at a time, in a process that it starts, and talks meanwhile."""
 
     def misbehave(self, scene: Scene) -> None:
         if os.fork() == 0:
@@ -83,7 +85,9 @@ class Grows(_Rough):
             while True:
                 kept.append(np.ones(1 << 19))
                 time.sleep(0.04)
-        time.sleep(300)
+        while True:
+            print("still here")
+            time.sleep(0.01)
 
 
 class Chatters(_Rough):
@@ -124,6 +128,16 @@ class Breeds(_Rough):
                 time.sleep(3600)
         subprocess.Popen(["sleep", "3600"], start_new_session=True)
         multiprocessing.get_context("fork").Process(target=time.sleep, args=[3600]).start()
+
+
+class Scribbles(_Rough):
+    """Writes into every socket that is open, as a library may that has closed its own twice."""
+
+    def misbehave(self, scene: Scene) -> None:
+        for number in range(3, 256):
+            with suppress(OSError):
+                if stat.S_ISSOCK(os.fstat(number).st_mode):
+                    os.write(number, b"\0\0\1\0")  # to `multiprocessing`: 256 bytes follow
 
 
 class Splits(_Rough):

@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,14 @@ import pytest
 from attrs import evolve
 from scene_files import Layers, pfm_bytes, write_png
 
-from matbench import cluster, comparison, parcels, run
+from matbench import cluster, comparison, parcels, provenance, run
 from matbench.errors import UserError
 from matbench.settings import Settings
 from matbench.unzip import ArchiveError
 
 ROUGH = Path(__file__).with_name("rough.py")
 METHODS = Path(__file__).with_name("methods.py")
+MATCHER = Path(__file__).with_name("programs") / "block_matcher.py"
 SMALL = "synthetic/box[size=96x72]"
 
 
@@ -145,13 +147,21 @@ def test_a_worker_that_dies_and_one_that_comes_late(
     assert by_name.reason["loops"] == "stopped after 8 s"
     assert not cells.alone.any()
     assert sorted(told) == sorted([(event, cell.key) for event in ("start", "done") for cell in ready.plan.cells])
+    running = list(accumulate(1 if event == "start" else -1 for event, _ in told))
+    assert max(running) <= 4, "three workers, and what the dead one had begun; others wait"
     assert not list((tmp_path / "run" / "cells").glob(".*"))
 
-    here = prepare(tmp_path / "here", "flat", "noise")
-    there = prepare(tmp_path / "there", "flat", "noise", dask=machines.address)
+    program = tmp_path / "matcher"
+    program.write_text(f"#!{sys.executable}\n{MATCHER.read_text()}")
+    program.chmod(0o755)
+    names = "flat", "noise", f"command[program={program}]"
+    here = prepare(tmp_path / "here", *names)
+    there = prepare(tmp_path / "there", *names, dask=machines.address)
     for one in (here, there):
         one.run()
         one.tables()
+        outcomes = [one.store.outcome(cell) for cell in one.plan.cells]
+        assert {(o.status, o.ran_on["commit"]) for o in outcomes if o} == {("ok", provenance.commit())}
     assert (there.folder / "results.csv").read_bytes() == (here.folder / "results.csv").read_bytes()
 
     # what the workers have not, or have otherwise, is refused

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from matbench import contract
@@ -159,6 +160,10 @@ def test_a_method_that_hangs_is_ended_and_nothing_else_is_tried() -> None:
     assert found[0].reason == "easy: no answer within 5 s"
     assert failed(found) == {"answers", "views"}
     assert "not tried" in next(f.reason for f in found if f.check == "tiny")
+    (breeder,) = methods("breeder", [UNRULY])
+    assert contract.check(breeder, [UNRULY], timeout=3)[0].reason == "easy: no answer within 3 s"
+    left = [p for p in psutil.process_iter(["cmdline"]) if "3598.75" in (p.info["cmdline"] or [])]
+    assert not left, "what it had started"
 
 
 def test_the_readme_s_example_passes_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -204,7 +209,7 @@ def test_failures_and_wrong_usage_have_their_own_exit_status(
         (("sgmb",), "did you mean 'sgbm'"),
         (("middle_plane",), "unknown algorithm"),
         (("sgbm[fil=true]",), "unknown parameter"),
-        (("sgbm", "--timeout", "0"), "timeout 0"),
+        (("sgbm", "--timeout", "0"), "timeout '0' is not a positive number of seconds"),
         ((str(tmp_path / "none.py"),), "does not exist"),
         (("command",), "program must be given"),
     ]:

@@ -11,10 +11,14 @@ import numpy as np
 import pandas as pd
 import psutil
 import pytest
+from attrs import evolve
 
 from matbench import comparison, limits
+from matbench import run as run_module
 from matbench.errors import UserError
+from matbench.keeper import Keeper, dismiss
 from matbench.settings import Settings
+from matbench.worker import Job
 
 ROUGH = Path(__file__).with_name("rough.py")
 METHODS = Path(__file__).with_name("methods.py")
@@ -50,12 +54,13 @@ EXPECTED = {
     "chatters": ("ok", "", "the last line, from C"),
     "upsets": ("ok", "", "Upsets begins"),
     "breeds": ("ok", "", "Breeds begins"),
+    "scribbles": ("crashed", "wrote into a file of the harness", "Scribbles begins"),
     "splits": ("ok", "", "Splits begins"),
     "interrupts": ("interrupted", "KeyboardInterrupt", "in misbehave"),
     "tampers": ("failed", "the method wrote into its input", "Tampers begins"),
     "writes": ("failed", "read-only", "in solve"),
     "bare": ("failed", "ndarray, not an Estimate", ""),
-    "orphans": ("failed", "its keeper was killed", ""),
+    "orphans": ("crashed", "its keeper was killed", ""),
     "flat": ("ok", "", ""),
 }
 
@@ -92,8 +97,46 @@ def test_a_keeper_that_is_killed_is_replaced(tmp_path: Path) -> None:
             seen[cell.method.algorithm] = f"{outcome.status} {outcome.reason}"  # type: ignore[attr-defined]
 
     ready.run(listen)
-    assert "its keeper was killed" in seen["orphans"]
+    assert seen["orphans"] == "crashed its keeper was killed"
     assert seen["flat"].startswith("ok")
+    cells = ready.tables()[1].set_index("algorithm")
+    assert (cells.status["orphans"], cells.reason["orphans"]) == EXPECTED["orphans"][:2], "the cell says so, too"
+    assert not list((tmp_path / "run" / "cells").glob(".*")), "what the killed keeper left"
+
+
+def test_a_cell_that_goes_wrong_when_it_is_done_again_is_not_what_it_was(tmp_path: Path) -> None:
+    plugin = tmp_path / "turns.py"
+    plugin.write_text(
+        "import os, signal\nfrom pathlib import Path\nimport numpy as np\nfrom matbench import Estimate\n\n"
+        "class Turns:\n    def solve(self, scene, context):\n"
+        "        if Path(__file__).with_name('now').exists():\n            os.kill(os.getppid(), signal.SIGKILL)\n"
+        "        return Estimate({scene.ref: np.ones(scene.views.shape[1:3], np.float32)})\n"
+    )
+    ready = comparison.prepare("turns", SMALL, out=tmp_path / "run", plugin=plugin)
+    ready.run()
+    assert ready.tables()[1].status.item() == "ok"
+    (tmp_path / "now").touch()
+    evolve(ready, settings=Settings(only="all")).run()
+    assert ready.tables()[1].status.item() == "crashed"
+
+
+def test_a_keeper_shares_a_process_among_cells_that_want_the_same(tmp_path: Path) -> None:
+    ready = comparison.prepare(
+        [f"tells[mark={mark}]" for mark in range(4)], SMALL, out=tmp_path / "run", plugin=[ROUGH, METHODS]
+    )
+    wanted = [("shared", 1), ("shared", 1), ("shared", 2), ("process", 2)]
+    pids = []
+    with run_module.without_main():
+        keeper = Keeper()
+    for cell, (isolation, threads) in zip(ready.plan.cells, wanted, strict=True):
+        job = Job(ready.folder, cell, ready.plan.plugin_files, threads, Settings(isolation=isolation))
+        keeper.take(job)
+        outcome, lives = keeper.done(job)
+        assert (outcome.status, lives) == ("ok", True), outcome.reason
+        pids.append(next(iter(ready.store.disparity(cell).values()))[0, 0])
+    dismiss([keeper])
+    assert pids[0] == pids[1]
+    assert len(set(pids)) == 3
 
 
 def test_processes_threads_and_marks(tmp_path: Path) -> None:

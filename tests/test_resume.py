@@ -23,8 +23,9 @@ from launcher import METHODS, SCENE, SEEDS
 from scene_files import Layers, write_png
 
 from matbench import comparison, plugins, scorer, scoring
+from matbench.cli import main
 from matbench.errors import UserError
-from matbench.lock import locked
+from matbench.lock import Work, locked
 from matbench.settings import Settings
 from matbench.status import prune, standing
 from matbench.store import FolderLost
@@ -314,6 +315,15 @@ def test_only_and_the_dry_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert left(names) == [failed, ("noise", "its files are damaged")]
     assert left(names, "missing") == [("noise", "its files are damaged")]
     assert left(names, "failed") == [failed]
+    line = ["compare", "-a", *names, "-s", SCENE, "--plugin", plugin, "--out", tmp_path / "run", "--dry-run", "--json"]
+    with pytest.raises(SystemExit) as ended:
+        main([str(word) for word in line])
+    told = json.loads(capsys.readouterr().out)
+    assert (ended.value.code or 0, told["cells"], [one["reason"] for one in told["todo"]]) == (
+        0,
+        3,
+        ["failed: ArithmeticError: the third digit is missing", "its files are damaged"],
+    )
     assert left(names, "all") == [("flat", "asked for again"), failed, ("noise", "its files are damaged")]
     assert ("flat", "not computed yet") in left(names, repeats=2)
     plugin.write_text(plugin.read_text() + "\n# other code\n")
@@ -338,6 +348,36 @@ def _reason_of_first_cell(ready: comparison.Comparison) -> str:
     assert outcome is not None
     assert outcome.status == "failed"
     return outcome.reason
+
+
+def test_told_to_end_while_it_scores_it_ends_and_the_next_one_clears_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run"
+    line = ["compare", "-a", "flat", "-s", SCENE, "--plugin", str(BEHAVED), "--out", str(run), "--json"]
+
+    def ended() -> int:
+        with pytest.raises(SystemExit) as stop:
+            main(line)
+        return int(stop.value.code or 0)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(scoring, "results", lambda *_: os.kill(os.getpid(), signal.SIGTERM))
+        assert ended() == 130
+    told = capsys.readouterr()
+    assert (told.out, told.err.splitlines()[-1]) == ("", "matbench: interrupted")
+    (run / ".results.csv.abc123").touch()  # as `kill -9` leaves it
+    assert ended() == 0
+    assert {path.name for path in run.glob(".*")} == {".lock"}
+
+
+def test_what_lies_about_who_works_is_not_believed(tmp_path: Path) -> None:
+    facts = {"pid": 1, "host": "here", "since": 1.0, "running": {"0123456789abcdef": 2.0}}
+    (tmp_path / ".work.json").write_text(json.dumps(facts))
+    assert Work.read(tmp_path) is not None
+    for lie in ({"host": "\x1b[2J"}, {"since": float("inf")}, {"running": {"0": float("nan")}}, {"pid": "x"}):
+        (tmp_path / ".work.json").write_text(json.dumps({**facts, **lie}))
+        assert Work.read(tmp_path) is None
 
 
 def test_a_run_killed_before_its_plan_was_written_can_begin(tmp_path: Path) -> None:
@@ -397,6 +437,14 @@ def test_names_with_separators_stay_inside(tmp_path: Path) -> None:
     (tmp_path / "run" / "plan.json").write_text(json.dumps(facts))
     place = ready.store.cell(ready.plan.cells[0])
     place.mkdir()
+    (place / "cell.json").write_text('{"outcome": {"status": "ok"}}')
+    spelled = '{"outcome": {"status": "failed", "reason": "one\\u001b[2J\\ntwo", "seconds": %s}}'
+    (place / "cell.json").write_text(spelled % "1e999")
+    assert ready.store.outcome(ready.plan.cells[0]) is None
+    (place / "cell.json").write_text(spelled % "1")
+    told = ready.store.outcome(ready.plan.cells[0])
+    assert told is not None
+    assert told.reason == "one [2J two"
     (place / "cell.json").write_text('{"outcome": {"status": "ok"}}')
     marker = tmp_path / "executed"
     np.savez(place / "disparity.npz", view_2=np.array([_Malice(str(marker))], object))

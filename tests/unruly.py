@@ -2,6 +2,8 @@
 
 import ctypes
 import os
+import subprocess
+import time
 
 import numpy as np
 
@@ -98,6 +100,15 @@ class Solid:
         return Estimate(
             {scene.ref: _flat(scene)}, Volume(space, np.full(space.shape, 2, np.float32), tuple(range(scene.n)))
         )
+
+
+class Breeder:
+    """Hangs, and has started what would outlive it."""
+
+    def solve(self, scene: Scene, context: Context) -> Estimate:
+        subprocess.Popen(["sleep", "3598.75"], start_new_session=True)
+        time.sleep(3600)
+        raise AssertionError("it waits longer than anybody")
 
 
 class Chatty:

@@ -1,6 +1,7 @@
 """`matbench check`: does a method keep to what the harness asks of it?"""
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +12,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Column, Table
 
-from matbench import contract, plugins, spec
+from matbench import contract, limits, plugins, spec
 from matbench.cli import DONE, FAILED, Console, Plugins
 from matbench.errors import UserError
 from matbench.plan import Method
@@ -42,7 +43,7 @@ _STYLES = {"pass": "green", "fail": "bold red", "skipped": "yellow", "note": "ye
 @app.default
 def check(
     *method: str,
-    timeout: Annotated[float, Parameter(help="Seconds that one solve may take.")] = 120,
+    timeout: Annotated[str, Parameter(help="Seconds that one solve may take; or none.")] = "120",
     plugin: Plugins = [],  # noqa: B006 -- never changed
     as_json: Annotated[bool, Parameter(name="--json", negative="", help="Machine-readable.")] = False,
 ) -> int:
@@ -55,8 +56,7 @@ def check(
     """
     if not method:
         raise UserError("no method: name one, such as 'matbench check okutomi_kanade' or 'matbench check mine.py'")
-    if not timeout > 0:
-        raise UserError(f"timeout {timeout:g} is not a number of seconds above 0")
+    patience = limits.seconds(timeout) or math.inf
     ready, files = _read(method, plugin)
     console = Console()
     results: list[tuple[Method, list[contract.Finding]]] = []
@@ -69,7 +69,7 @@ def check(
             def listen(done: int, total: int, name: str) -> None:
                 progress.update(task, completed=done, total=total, description=escape(f"{one}: {name}"))  # noqa: B023
 
-            results.append((one, contract.check(one, files, timeout, listen)))
+            results.append((one, contract.check(one, files, patience, listen)))
         if not as_json:
             console.print(_table(*results[-1]))
             console.say(_summary(*results[-1]))

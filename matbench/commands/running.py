@@ -5,8 +5,8 @@ import math
 import shlex
 import signal
 import sys
-from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +67,7 @@ def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
         voice.say(f"without {', '.join(scenes)}: {reason}")
     if ready.settings.dask is None and (crowd := crowded(ready.settings.jobs, ready.settings.threads_each())):
         voice.say(crowd)
-    with locked(ready.folder):
+    with locked(ready.folder), _ended_as_by_ctrl_c():
         try:
             stopped = _run(ready, voice)
             cells = publish(ready, options.metric, is_ablation, voice, stopped)
@@ -83,17 +83,30 @@ def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
     return DONE if cells["status"].isin(FINAL).all() else FAILED
 
 
-def show_plan(ready: Comparison) -> int:
+def show_plan(ready: Comparison, options: Options) -> int:
     """Say what a run would do, and why; nothing is written."""
+    todo = explained(ready.plan, ready.store, ready.settings)
+    total, stale = len(ready.plan.cells), len(ready.store.stale(ready.plan))
+    if options.as_json:
+        facts = {
+            "folder": str(ready.folder),
+            "cells": total,
+            "todo": [{"cell": str(cell), "key": cell.key, "reason": why} for cell, why in todo],
+            "stale": stale,
+            "left_out": {reason: list(scenes) for reason, scenes in ready.left_out.items()},
+        }
+        print(json.dumps(facts, indent=1))
+        return DONE
+    if options.quiet:
+        print(ready.folder)
+        return DONE
     console = Console()
     for reason, scenes in ready.left_out.items():
         console.say(f"without {', '.join(scenes)}: {reason}")
-    todo = explained(ready.plan, ready.store, ready.settings)
-    total = len(ready.plan.cells)
     console.say(f"{total - len(todo)} of {total} cells stay as they are in {ready.folder}, {len(todo)} would run")
     for cell, why in todo:
         console.say(f"  {cell}: {why}")
-    if stale := len(ready.store.stale(ready.plan)):
+    if stale:
         console.say(f"{stale} stored cells are of other code or pixels")
     return DONE
 
@@ -218,16 +231,22 @@ def _run(ready: Comparison, voice: Voice) -> bool:
     if len(todo) < total:
         what = "are done already" if ready.settings.only is None else "stay as they are"
         voice.say(f"{total - len(todo)} of {total} cells {what} in {ready.folder}")
-    # told to end, it ends its processes as if Ctrl-C had been typed
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with Progress(voice.talk, todo, done=total - len(todo)) as progress:
             ready.run(progress)
     except KeyboardInterrupt:
         return True
+    return False
+
+
+@contextmanager
+def _ended_as_by_ctrl_c() -> Iterator[None]:
+    """When the system tells this process to end, let it end as if Ctrl-C had been typed."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
     finally:
         signal.signal(signal.SIGTERM, before)
-    return False
 
 
 def _measured(results: Any, metric: str, voice: Voice) -> str:

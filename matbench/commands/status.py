@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from matbench.cli import DONE, Console
+from matbench.commands.progress import duration
 from matbench.status import Standing, prune, standing
 
 app = App(
@@ -63,13 +64,13 @@ def _lines(found: Standing) -> list[str]:
     ended = ", ".join(f"{count} {status}" for status, count in found.counts.items()) or "none ended"
     lines = [f"{found.folder}: {done} of {found.cells} cells done, {found.left} left ({ended})"]
     if found.work:
-        elapsed = time_text(_age(found))
+        elapsed = duration(_age(found))
         lines.append(f"running for {elapsed}, process {found.work.pid} on {found.work.host}")
-        lines += [f"  {cell}, for {time_text(spent)}" for cell, spent in found.running]
+        lines += [f"  {cell}, for {duration(spent)}" for cell, spent in found.running]
     elif found.left:
         lines.append("not running: the command that began it goes on from here")
     if found.left:
-        guess = "not known yet" if found.seconds_left is None else f"about {time_text(found.seconds_left)}"
+        guess = "not known yet" if found.seconds_left is None else f"about {duration(found.seconds_left)}"
         lines.append(f"time left: {guess}")
     if found.stale:
         size = found.stale_bytes / 2**20
@@ -77,18 +78,6 @@ def _lines(found: Standing) -> list[str]:
     if found.tables and not found.work:
         lines.append(f"tables are stale, {found.tables}: type matbench score {found.folder}")
     return lines
-
-
-def time_text(seconds: float) -> str:
-    """A time as people say it.
-
-    >>> time_text(42), time_text(200), time_text(9000)
-    ('42 s', '3 min', '2 h 30 min')
-    """
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
 
 
 def _age(found: Standing) -> float:
