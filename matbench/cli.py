@@ -432,7 +432,7 @@ app.command("matbench.commands.scene:app", name="scene", help="Look at scenes, c
 
 
 def main(tokens: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0 all well, 1 something failed, 2 wrong usage, 130 interrupted."""
+    """Run the command line and exit: 0 all well, 1 something failed, 2 wrong usage, 3 a regression, 130 interrupted."""
     try:
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except UserError as error:

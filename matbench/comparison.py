@@ -151,7 +151,7 @@ class Comparison:
         page.write(
             path,
             page.Report(
-                title=f"matbench: {self.folder.name}",
+                title=self.folder.resolve().name,
                 command=self.command,
                 results=results,
                 cells=cells,

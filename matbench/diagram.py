@@ -13,6 +13,11 @@ from matbench.drawing import Reduced
 from matbench.perspective import Eye, Point, from_the_side
 from matbench.space import DisparitySpace
 
+GAMMA = 2.0
+"""Small values of a dense volume are this power of themselves: else their haze would hide the large ones."""
+
+THROUGH_ALL = 3.0  # optical depth across a dense volume, on average
+
 
 def _depth(space: DisparitySpace, plane: float) -> float:
     """Where a plane's far side is drawn in disparity space: the whole is half as deep as the image is wide."""
@@ -100,17 +105,22 @@ class Dense:
         (planes, rows, columns) float16 in [0, 1], the nearest plane first.
     size, origin
         Of an element, and the corner of the first, as in `Voxels`.
+    depth
+        Optical depth of a whole axis of ones. Surfaces are a plane or two thick and would hardly be seen, fields
+        that are full hide all: whatever the values, a volume is as dense on average.
     """
 
     values: NDArray[np.float16]
     size: Point
     origin: Point
+    depth: float
 
 
 def dense(volume: Reduced) -> Dense:
     """All elements of a volume where they are in disparity space."""
     values = volume.values.transpose(1, 0, 2)[::-1].astype(np.float16) / np.float16(255)
-    return Dense(values, *_grid(volume))
+    filled = float(np.mean(values.astype(np.float32) ** GAMMA))
+    return Dense(values, *_grid(volume), THROUGH_ALL / max(filled, 0.5 / len(values)))
 
 
 def _grid(volume: Reduced) -> tuple[Point, Point]:

@@ -268,7 +268,13 @@ class Recorder:
         self.contents.volumes.append((path, (row - volume.first_row) // volume.steps[0]))
         made = diagram.dense(drawing.coarser(volume, row, DENSE_BYTES))
         what = rr.Volume3D(
-            made.values, voxel_size=made.size, translation=made.origin, value_range=(0, 1), colormap="inferno"
+            made.values,
+            voxel_size=made.size,
+            translation=made.origin,
+            value_range=(0, 1),
+            gamma=diagram.GAMMA,
+            colormap="inferno",
+            optical_density=made.depth,
         )
         self.contents.dense.append(self.log("haze", *name, what=what))
 

@@ -1,10 +1,9 @@
 """How errors are spread: over thresholds, and over how many of the views see a pixel."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from attrs import frozen
 from numpy.typing import NDArray
 
@@ -13,7 +12,6 @@ from matbench.regions import seen_from
 from matbench.reports import figures
 from matbench.reports.tables import REGIONS, Shared
 from matbench.scene import Scene
-from matbench.spec import read_scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,13 +84,6 @@ Spreads = Mapping[tuple[str, str], Spread]
 """Of each method on each scene."""
 
 
-def _mean(parts: Sequence[tuple[str, NDArray[np.float64]]]) -> NDArray[np.float64]:
-    """The mean over scenes, one with different options being one scene."""
-    names = [read_scene(name).name for name, _ in parts]
-    rows = pd.DataFrame([values for _, values in parts]).groupby(names).mean()
-    return np.asarray(rows.mean(), np.float64)
-
-
 def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
     """A panel for each region: share of pixels with an error above each threshold, a curve for each ranked method."""
     measured = {region for part in spreads.values() for region in part.above}
@@ -102,10 +93,10 @@ def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
     for region in found:
         curves = {}
         for method in methods:
-            here = [(s, spreads[method, s]) for s in scope.scenes if (method, s) in spreads]
-            parts = [(s, part.above[region]) for s, part in here if region in part.above]
+            here = [spreads[method, s] for s in scope.scenes if (method, s) in spreads]
+            parts = [part.above[region] for part in here if region in part.above]
             if parts:
-                curves[method] = (THRESHOLDS, _mean(parts))
+                curves[method] = (THRESHOLDS, np.mean(parts, axis=0))
         panels.append((region, curves))
     return figures.panels(panels, "threshold, px of the pair", "pixels above it, %", every=6)
 
@@ -120,11 +111,10 @@ def by_views(spreads: Spreads, scope: Shared) -> "tuple[Figure | None, list[str]
         places = sorted({k for s in scenes for k in shared[s].by_views})
         curves = {}
         for method in methods:
-            rows = [
-                _mean([(s, np.array([spreads[method, s].by_views[k]])) for s in scenes if k in shared[s].by_views])
-                for k in places
+            means = [
+                np.mean([spreads[method, s].by_views[k] for s in scenes if k in shared[s].by_views]) for k in places
             ]
-            curves[method] = (np.array(places, float), np.concatenate(rows))
+            curves[method] = (np.array(places, float), np.array(means))
         panels.append((f"{count} views, {len(scenes)} scene{'s' if len(scenes) != 1 else ''}", curves))
         partly = [k for k in places if sum(k in shared[s].by_views for s in scenes) < len(scenes)]
         said += [f"{count} views: not every scene has pixels seen by {', '.join(map(str, partly))}."] if partly else []

@@ -182,7 +182,7 @@ def front(points: Sequence[tuple[float, float, str]]) -> list[tuple[float, float
 COSTS = {"seconds": "seconds per scene (logarithmic)", "memory": "peak memory, MiB (logarithmic)"}
 
 
-def cost(rows: pd.DataFrame, score: str, unit: str, against: str = "seconds", compared: bool = True) -> "Figure | None":
+def cost(rows: pd.DataFrame, score: str, unit: str, against: str = "seconds") -> "Figure | None":
     """Accuracy against what it costs: a point per ranked method of `tables.summary`, or None without any.
 
     Parameters
@@ -195,8 +195,6 @@ def cost(rows: pd.DataFrame, score: str, unit: str, against: str = "seconds", co
         Of that column.
     against
         Its column for the horizontal axis, one of `COSTS`.
-    compared
-        Are the costs of one machine, so that there is a front of methods that no other beats in both?
     """
     ranked = rows[rows["ranked"]].dropna(subset=[score, against])
     points = [(max(float(r[against]), 1e-4), float(r[score]), printable(str(m))) for m, r in ranked.iterrows()]
@@ -207,10 +205,9 @@ def cost(rows: pd.DataFrame, score: str, unit: str, against: str = "seconds", co
 
     figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     axes = figure.subplots()
-    if compared:
-        along = front(points)
-        look: dict[str, Any] = {"color": INK, "lw": 1, "ls": (0, (3, 3)), "alpha": 0.6}
-        axes.step([p[0] for p in along], [p[1] for p in along], where="post", **look)
+    along = front(points)
+    look: dict[str, Any] = {"color": INK, "lw": 1, "ls": (0, (3, 3)), "alpha": 0.6}
+    axes.step([p[0] for p in along], [p[1] for p in along], where="post", **look)
     axes.scatter([p[0] for p in points], [p[1] for p in points], s=52, color="#3b78c3", edgecolor=INK, lw=0.8, zorder=3)
     axes.set_xscale("log")
     xs = [p[0] for p in points]

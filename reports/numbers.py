@@ -29,16 +29,6 @@ Entry = list[Any]
 """[number or None, as shown, place]: what a cell of a table needs, in the template and in the script."""
 
 
-def incomparable(cells: pd.DataFrame) -> str:
-    """Why the times of a run must not be ranked, in words; empty if nothing speaks against it."""
-    good = cells[cells["status"] == "ok"]
-    if "machine" in good and good["machine"].dropna().nunique() > 1:
-        return f"cells ran on {good['machine'].dropna().nunique()} machines"
-    if "alone" in good and (good["alone"].astype(str).str.lower() == "false").any():
-        return "some cells ran while others did"
-    return ""
-
-
 @frozen(eq=False)
 class Numbers:
     """Every table of a run, from which template and script take theirs.
@@ -171,23 +161,13 @@ class Numbers:
 
     @cached_property
     def costs(self) -> dict[str, dict[str, Entry]]:
-        """What it cost, by name of the column of the cells; times are marked only where they are comparable."""
-        scope, out = self.scope, {}
-        good = self.report.cells[self.report.cells["status"] == "ok"]
-        for name, (unit, _) in COSTS.items():
-            if name not in good:
-                continue
-            values = good.assign(value=good[name].astype(float))
-            wide = values.groupby(["scene", "method"])["value"].mean().unstack("method")
-            wide = wide.reindex(index=list(scope.asked), columns=list(scope.methods))
-            # the memory that a machine must have is that of the hungriest scene
-            over = {
-                m: wide.loc[list(scope.counted(m)), m].agg("max" if name == "peak_mb" else "mean", skipna=False)
-                for m in scope.methods
-            }
-            compared = self._ranked & (name != "seconds" or not incomparable(self.report.cells))
-            out[name] = entries(pd.Series(over, dtype=float), compared, unit, higher=False)
-        return out
+        """What it cost, by name of the column of the cells."""
+        measures = {"seconds": tables.seconds, "peak_mb": tables.memory}
+        return {
+            name: entries(measures[name](self.report.cells, self.scope), self._ranked, unit, higher=False)
+            for name, (unit, _) in COSTS.items()
+            if name in self.report.cells
+        }
 
     def against(self, metric: str, region: str, reference: str | None = None) -> list[dict[str, Any]]:
         """How far each ranked method is from a reference, by default the best: a table's lines, as the script's."""

@@ -16,7 +16,7 @@ from matbench import coloring
 from matbench.regions import REGIONS
 from matbench.reports import curves, errors, figures, passes, switches, tables
 from matbench.reports.content import Report
-from matbench.reports.numbers import COSTS, Numbers, incomparable
+from matbench.reports.numbers import COSTS, Numbers
 from matbench.reports.pictures import gallery
 from matbench.reports.tables import METRIC, REGION, Shared
 from matbench.statistics import FEW
@@ -66,7 +66,7 @@ def render(report: Report) -> str:
         counts=report.cells["status"].value_counts().to_dict(),
         table=_table(numbers, rows),
         costs={name: COSTS[name] for name in numbers.costs},
-        incomparable=incomparable(report.cells),
+        timing=tables.timing_note(report.cells),
         differences=numbers.against(numbers.metric, numbers.region) if numbers.units else [],
         about=REGIONS,
         scenes=shown.scenes,
@@ -158,11 +158,7 @@ def _cost_figures(numbers: Numbers, rows: pd.DataFrame) -> list[str]:
     """Accuracy against seconds, and against memory."""
     memory = {m: entry[0] for m, entry in numbers.costs.get("peak_mb", {}).items()}
     costs = rows.assign(memory=pd.Series(memory, dtype=float).reindex(rows.index))
-    score, compared = f"{METRIC} {REGION}", not incomparable(numbers.report.cells)
-    drawn = (
-        figures.cost(costs, score, "%", compared=compared),
-        figures.cost(costs, score, "%", "memory"),
-    )
+    drawn = (figures.cost(costs, f"{METRIC} {REGION}", "%", against) for against in figures.COSTS)
     return [figures.svg(figure) for figure in drawn if figure is not None]
 
 

@@ -15,7 +15,7 @@ import pandas as pd
 from attrs import frozen
 
 from matbench.errors import UserError, unknown
-from matbench.reports import tables
+from matbench.reports import standing, tables
 from matbench.reports.tables import METRIC, REGION, REGIONS, Shared
 from matbench.spec import first_line
 from matbench.statistics import FEW
@@ -62,6 +62,11 @@ class Sheet:
         return [str(c) for c in self.texts.columns if c not in ("scene", "method", RANK)]
 
     @property
+    def judged(self) -> str:
+        """The region that methods are ordered and ranked by."""
+        return _judged(self.regions)
+
+    @property
     def has_scenes(self) -> bool:
         """Are there rows of single scenes?"""
         return bool((self.texts["scene"] != MEAN).any())
@@ -70,8 +75,12 @@ class Sheet:
     def caption(self) -> str:
         unit = f" ({self.unit})" if self.unit else ""
         which = "higher" if self.higher else "lower"
-        rank = f"{RANK[0].upper()}{RANK[1:]}: over all scenes and the regions shown."
+        rank = f"{RANK.capitalize()}: the place by {self.metric} in {self.judged}, mean over scenes."
         return f"{self.metric}{unit} by region; {which} is better. Best in bold, second underlined. {rank}"
+
+
+def _judged(regions: Sequence[str]) -> str:
+    return REGION if REGION in regions else regions[0]
 
 
 def read(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -145,17 +154,17 @@ def sheet(
         for r in chosen
     }
     means = pd.DataFrame({r: tables.over_scenes(table, scope) for r, table in by_region.items()})
-    means[RANK] = _mean_ranks(by_region, scope, unit, higher, scope.scenes)
-    judged = means[REGION if REGION in chosen else chosen[0]]
+    judged = by_region[_judged(chosen)]
+    means[RANK] = pd.Series(standing.mean_ranks(judged, scope, unit, higher))
     unranked = pd.Series([not scope.is_ranked(m) for m in scope.methods], index=list(scope.methods))
-    order = pd.DataFrame({"unranked": unranked, "by": judged}).sort_values(
+    order = pd.DataFrame({"unranked": unranked, "by": means[_judged(chosen)]}).sort_values(
         ["unranked", "by"], ascending=[True, not higher], kind="stable"
     )
     blocks = {MEAN: means}
     for scene in scope.asked if by_scene and len(scope.asked) > 1 else ():
         block = pd.DataFrame({r: table.loc[scene] for r, table in by_region.items()})
         block = block.where(pd.Series({m: scene in scope.has[m] for m in scope.methods}), axis=0)
-        block[RANK] = _mean_ranks(by_region, scope, unit, higher, (scene,))
+        block[RANK] = pd.Series(standing.mean_ranks(judged.loc[[scene]], scope, unit, higher))
         blocks[scene] = block
     texts, places = [], []
     for name, block in blocks.items():
@@ -183,26 +192,6 @@ def sheet(
         why,
         tuple(_notes(cells, scope)),
     )
-
-
-def _mean_ranks(
-    by_region: Mapping[str, pd.DataFrame], scope: Shared, unit: str, higher: bool, scenes: Sequence[str]
-) -> pd.Series:
-    """Method -> mean of its ranks over scenes and regions, judged by what is shown: ties share their mean rank.
-
-    Only methods that have every shared scene are ranked; one without a value is last. A region that
-    is empty in a scene does not count, nor does a scene in which not all of them have a score.
-    """
-    rivals = [m for m in scope.methods if scope.is_ranked(m)]
-    found = []
-    for table in by_region.values():
-        for scene in scenes:
-            values = table.loc[scene, rivals]
-            if scene in scope.scenes and values.notna().any():
-                shown = values.map(lambda v: float(tables.text(v, unit)) if pd.notna(v) else float("nan"))
-                found.append(shown.rank(ascending=not higher, na_option="bottom"))
-    ranks = pd.concat(found, axis=1).mean(axis=1) if found else pd.Series(dtype=float)
-    return ranks.reindex(list(scope.methods))
 
 
 def _notes(cells: pd.DataFrame, scope: Shared) -> list[str]:

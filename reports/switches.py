@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from matbench.reports.figures import INK
+from matbench.reports.paper import tex
 from matbench.reports.tables import METRIC, REGIONS
 
 if TYPE_CHECKING:
@@ -64,8 +65,11 @@ def terminal(ablation: pd.DataFrame, metric: str = METRIC) -> list[Table]:
 
 def latex(ablation: pd.DataFrame, metric: str = METRIC) -> str:
     """The same numbers as a LaTeX table (package booktabs)."""
-    table = lines(ablation, metric).drop(columns="size").replace({"→": r"$\\to$", "–": "--"}, regex=True)
-    table["switch"] = table["switch"].str.replace("_", r"\_", regex=False)
+    table = lines(ablation, metric).drop(columns="size")
+    for name in ("switch", "region", "verdict"):
+        table[name] = table[name].map(tex)
+    for name in ("change", "interval"):
+        table[name] = table[name].str.replace("-", "$-$").str.replace("–", "--")
     body = table.style.hide(axis="index").to_latex(hrules=True, column_format="llrrrl")
     return f"% {metric}: mean change, 95 % bootstrap interval over scenes\n{body}"
 

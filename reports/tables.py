@@ -184,6 +184,15 @@ def seconds(cells: pd.DataFrame, scope: Shared) -> pd.Series:
     return pd.Series({m: wide.loc[list(scope.counted(m)), m].mean(skipna=False) for m in scope.methods}, dtype=float)
 
 
+def memory(cells: pd.DataFrame, scope: Shared) -> pd.Series:
+    """Method -> peak memory of the scene that took most, of those that count: what a machine must have."""
+    planned = labelled(cells)
+    good = planned[planned["status"] == "ok"]
+    table = good.assign(peak=good["peak_mb"].astype(float)).groupby(["scene", "method"])["peak"].max().unstack("method")
+    wide = table.reindex(index=list(scope.asked), columns=list(scope.methods))
+    return pd.Series({m: wide.loc[list(scope.counted(m)), m].max(skipna=False) for m in scope.methods}, dtype=float)
+
+
 def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False) -> pd.DataFrame:
     """Methods x means, best first by `metric` in `all`.
 

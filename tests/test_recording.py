@@ -12,7 +12,7 @@ import pytest
 import rerun as rr
 from attrs import evolve
 
-from matbench import coloring, drawing, recording
+from matbench import coloring, diagram, drawing, recording
 from matbench.about import ERROR_METRIC
 from matbench.algorithm import Context, Estimate, Probe
 from matbench.metrics import score
@@ -233,6 +233,8 @@ def test_volumes_in_space_are_those_of_the_sliders(rows: dict[str, list[Row]]) -
         expected = bytes_.transpose(1, 0, 2)[::-1] / 255  # nearest plane first, rows, columns
         assert tuple(shape) == expected.shape
         assert np.allclose(values.reshape(shape), expected, atol=1e-3)
+        through = field["Volume3D:optical_density"] * np.mean(expected ** field["Volume3D:gamma"])
+        assert through == pytest.approx(diagram.THROUGH_ALL, rel=0.01), "full or nearly empty, it is seen"
 
 
 def test_rays_meet_in_the_target_point(path: Path, told: tuple[Scene, Teller]) -> None:

@@ -1,5 +1,7 @@
 """Two recordings in one: both are there whole, each under its side, and only of one scene."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +62,9 @@ def test_both_are_there_whole(tmp_path: Path) -> None:
             if not entity.startswith("/__"):
                 assert merged.pop(f"/{side}{entity}") == told
     assert set(merged) <= {"/__properties"}
+    verify = [sys.executable, "-m", "rerun_cli", "rrd", "verify", str(tmp_path / "both.rrd")]
+    done = subprocess.run(verify, capture_output=True, text=True, check=True)
+    assert "1 file verified without error" in done.stdout + done.stderr
     reader = rr.chunk.RrdReader(tmp_path / "both.rrd")
     assert (len(reader.recordings()), len(reader.blueprints())) == (1, 1)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["1.rrd", "2.rrd", "both.rrd"]

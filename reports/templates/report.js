@@ -182,7 +182,7 @@
     return context.getImageData(0, 0, canvas.width, canvas.height);
   };
 
-  // Disparities in pixels of the pair, NaN where there is none; the twin of maps.Coding.encode.
+  // Disparities in pixels of the pair, NaN where there is none; the twin of encoding.Coding.encode.
   const numbers = async (scene, map) => {
     const { low, step, gain } = data.codings[scene];
     const { width, height, data: rgba } = await pixels(source(scene, map));

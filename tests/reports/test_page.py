@@ -2,6 +2,7 @@
 
 import json
 import re
+import time
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
@@ -112,6 +113,39 @@ def test_maps_may_be_a_function_and_scenes_unknown(report: Report) -> None:
     called = evolve(report, maps=report.disparity)
     assert page.render(called) == page.render(report)
     assert page.render(evolve(report, scenes={})).count("no maps") == 2
+
+
+def test_ten_methods_on_ten_scenes_of_quarter_size_stay_below_15_MB(report: Report, tmp_path: Path) -> None:
+    """Maps with sub-pixel noise in every pixel, a tenth of a pixel of the pair."""
+    random = np.random.default_rng(0)
+    scenes, maps = {}, {}
+    template, methods = next(iter(report.scenes.values())), [f"method_{k}" for k in range(10)]
+    waves = np.add.outer(np.sin(np.arange(375) / 40), np.cos(np.arange(450) / 60))
+    for k in range(10):
+        truth = (8 + 3 * waves + k).astype(np.float32)
+        views = np.repeat(np.rint(30 * truth / 3 + 3 * random.normal(size=(7, 375, 450)))[..., None], 3, axis=3)
+        scenes[f"made/{k}"] = evolve(
+            template,
+            name=f"made/{k}",
+            views=views.clip(0, 255).astype(np.uint8),
+            labels=tuple("abcdefg"),
+            disparities=type(template.disparities)(0, 30),
+            truth={1: truth},
+            regions={"all": np.isfinite(truth)},
+        )
+        for method in methods:
+            noise = random.normal(0, 0.05, truth.shape).astype(np.float32)
+            maps[method, "", f"made/{k}", 0] = truth + noise
+    first = report.results[(report.results["algorithm"] == "good") & (report.results["scene"] == "made/one")]
+    ran = report.cells.iloc[[0]]
+    both = [(m, s) for m in methods for s in scenes]
+    results = pd.concat([first.assign(algorithm=m, scene=s) for m, s in both])
+    cells = pd.concat([ran.assign(algorithm=m, scene=s) for m, s in both])
+    before = time.process_time()
+    page.write(tmp_path / "report.html", evolve(report, results=results, cells=cells, maps=maps, scenes=scenes))
+    size = (tmp_path / "report.html").stat().st_size
+    print(f"{size / 1e6:.1f} MB, {time.process_time() - before:.1f} s of CPU time")
+    assert size < 15e6
 
 
 def test_the_figure_takes_names_literally(report: Report) -> None:

@@ -12,9 +12,10 @@ from scipy.stats import bootstrap
 
 from matbench.metrics import total_bad
 from matbench.regions import view_regions
-from matbench.reports import epipolar, errors, numbers, page, passes, standing, tables
+from matbench.reports import epipolar, errors, page, passes, standing, tables
 from matbench.reports.content import Report
 from matbench.reports.encoding import FINER, Coding, photograph, side_for
+from matbench.reports.numbers import Numbers
 from matbench.scenes import load_scene
 from matbench.space import DisparitySpace, Volume, surface, visibility
 from matbench.statistics import Effect, intervals, paired_effect, paired_effects
@@ -162,15 +163,34 @@ def test_all_tables_at_once_are_those_made_alone(report: Report) -> None:
         pd.testing.assert_frame_equal(table, tables.per_scene(again, region, metric), check_names=False)
 
 
-def test_times_of_several_machines_or_of_company_are_not_ranked(report: Report) -> None:
-    assert numbers.incomparable(report.cells) == ""
-    machines = report.cells.assign(machine=["a", "b"] * 2 + ["a", None])
-    assert numbers.incomparable(machines) == "cells ran on 2 machines"
-    company = report.cells.assign(alone=[True] * 4 + [False, None])
-    assert "while others did" in numbers.incomparable(company)
-    html = page.render(evolve(report, cells=machines))
-    assert "Times are not ranked: cells ran on 2 machines" in html
-    assert page.render(report).count("Times are not ranked") == 0
+def test_costs_are_those_of_the_printed_tables(report: Report) -> None:
+    company = report.cells.assign(alone=[True, True, True, False, True, None], machine="a")
+    rows = tables.summary(report.results, company)
+    labelled = evolve(report, results=tables.labelled(report.results), cells=tables.labelled(company))
+    made = Numbers(labelled, tables.shared(report.results, company))
+    shown = {m: seconds for m, (seconds, _, _) in made.costs["seconds"].items()}
+    assert shown == {m: None if np.isnan(v) else v for m, v in rows["seconds"].items()}
+    assert shown["good"] == 0.5
+    assert list(shown.values()).count(None) == 1, "one ran while others did"
+    assert made.costs["peak_mb"]["good"][:2] == [100, "100"]
+    html = page.render(evolve(report, cells=company))
+    assert f"T{tables.timing_note(company)[1:]}" in html
+    assert "not alone" not in page.render(report)
+
+
+def test_curves_against_the_threshold_go_through_the_tables_means() -> None:
+    scenes = ("a[noise=0]", "a[noise=9]", "b")
+    scope = tables.Shared(("m",), scenes, {"m": frozenset(scenes)}, scenes)
+    size = len(errors.THRESHOLDS)
+    spreads = {
+        ("m", s): errors.Spread({"all": np.full(size, v)}, {1: v}, 2)
+        for s, v in zip(scenes, (10.0, 20.0, 60.0), strict=True)
+    }
+    table = pd.DataFrame({"m": [10.0, 20.0, 60.0]}, index=list(scenes))
+    (mean,) = tables.over_scenes(table, scope)
+    for figure in (errors.thresholds(spreads, scope), errors.by_views(spreads, scope)[0]):
+        assert figure is not None
+        assert set(figure.axes[0].lines[0].get_ydata()) == {mean}
 
 
 def test_energies_are_drawn_relative_to_their_first_pass(report: Report) -> None:

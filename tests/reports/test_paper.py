@@ -15,6 +15,7 @@ from matbench.cli import main
 from matbench.errors import UserError
 from matbench.reports import paper, tables
 from matbench.reports.content import Report
+from matbench.reports.numbers import Numbers
 
 AWKWARD = r"50% of_a\b {c}|d & $e$ #f ~g ^h *i* `j` <k> 'l' " + '"m" ä – 雪'
 
@@ -82,7 +83,7 @@ def test_marks_stand_where_the_numbers_are_best(report: Report) -> None:
     assert sheet.texts["mean rank"].tolist()[:3] == ["1.00", "2.00", "–"]
 
 
-def test_mean_ranks_are_over_scenes_and_regions() -> None:
+def test_mean_ranks_are_over_scenes_and_those_of_the_page() -> None:
     values = {("a", "s1"): (1, 5), ("b", "s1"): (2, 4), ("a", "s2"): (3.001, 1), ("b", "s2"): (3.002, 1)}
     rows = [
         (m, "", s, "v", 0, region, "total_bad_1", v, "%", 9)
@@ -93,10 +94,9 @@ def test_mean_ranks_are_over_scenes_and_regions() -> None:
     results = pd.DataFrame(rows, columns=columns)
     cells = results[["algorithm", "params", "scene", "seed"]].drop_duplicates().assign(status="ok", seconds=1.0)
     sheet = paper.sheet(results, cells)
-    # ranks of a: 1 and 2 in s1; what is shown alike shares 1.5, twice, in s2
-    assert sheet.texts["mean rank"][:2].tolist() == ["1.50", "1.50"]
-    ranked = paper.sheet(results, cells, regions=["all"])
-    assert ranked.texts.set_index(["scene", "method"])["mean rank"].to_dict() == {
+    assert "Mean rank: the place by total_bad_1 in all" in sheet.caption
+    # in `all`, a is first in s1; in s2 what is shown alike shares 1.5
+    assert sheet.texts.set_index(["scene", "method"])["mean rank"].to_dict() == {
         ("mean", "a"): "1.25",
         ("mean", "b"): "1.75",
         ("s1", "a"): "1.00",
@@ -104,6 +104,12 @@ def test_mean_ranks_are_over_scenes_and_regions() -> None:
         ("s2", "a"): "1.50",
         ("s2", "b"): "1.50",
     }
+    labelled = Report("", "", tables.labelled(results), tables.labelled(cells))
+    page = Numbers(labelled, tables.shared(results, cells))
+    for region, chosen in (("all", ()), ("occ", ("occ",))):
+        texts = paper.sheet(results, cells, regions=chosen, by_scene=False).texts.set_index("method")
+        found = page.ranks["total_bad_1"][region]
+        assert texts["mean rank"].to_dict() == {m: shown for m, (_, shown, _) in found.items()}
     higher = paper.sheet(results, cells, higher=True, regions=["all"])
     assert higher.texts["mean rank"][:2].tolist() == ["1.25", "1.75"]
     assert higher.texts["method"][0] == "b"
