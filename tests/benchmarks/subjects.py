@@ -146,7 +146,7 @@ def _started(name: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
 
 
 def passes() -> Work:
-    """Ten over each row, one row after the other, always from the same start."""
+    """Ten over all points, always from the same start."""
     name = "materiality[preset=paper]"
     rho, begin = _started(name)
     energy, mu = instance(name)._energy(_matcher(name), rho, 1), np.empty_like(begin)
