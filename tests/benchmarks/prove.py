@@ -99,7 +99,7 @@ PLANTS = (
             (
                 "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n",
                 "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n"
-                "        over_rows(borrow, (self.space.rows * 3 + 9) // 10, threads, share(self.space.rows, threads))\n",
+                "        over_rows(borrow, (self.space.rows * 3 + 9) // 10, threads, share(self.space.rows, threads))\n",  # noqa: E501
             ),
         ),
     ),
