@@ -114,9 +114,14 @@ class Judged:
         return median(self.ratios) if self.ratios else float("nan")
 
     @property
+    def expected(self) -> float:
+        """Middle of the stored ratios; NaN if none are."""
+        return self.stored.middle if self.stored else float("nan")
+
+    @property
     def change(self) -> float:
-        """Measured over the middle of the stored ratios, less one; NaN without either."""
-        return self.ratio / self.stored.middle - 1 if self.stored else float("nan")
+        """Measured over expected, less one; NaN without either."""
+        return self.ratio / self.expected - 1
 
 
 def folder(tree: Tree) -> Path:
@@ -201,7 +206,8 @@ def judge(
     """
     ratios = {name: [timing.ratio] for name, timing in first.timings.items()}
     known = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
-    suspects = [n for n, old in known.items() if n in ratios and ratios[n][0] > old.limit(margin) / (1 + margin / 2)]
+    doubtful = {name: old.limit(margin) - old.middle * margin / 2 for name, old in known.items()}
+    suspects = [name for name, bound in doubtful.items() if name in ratios and ratios[name][0] > bound]
     failed = dict(first.failed)
     for _ in range(SITTINGS - 1 if suspects else 0):
         sitting = again(suspects)

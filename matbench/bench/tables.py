@@ -67,7 +67,7 @@ def judged(results: Sequence[Judged]) -> Table:
             seconds(one.timing.seconds) if one.timing else one.reason,
             _number(one.ratio, ".4g"),
             _reach(one.timing),
-            _number(one.stored.middle, ".4g") if one.stored else "",
+            _number(one.expected, ".4g"),
             _number(one.change, "+.1%"),
             _number(one.limit, "+.0%"),
         )

@@ -263,9 +263,7 @@ class _Judging:
             self._unsteady(stored)
         for one in slower:
             agreed = " ".join(f"{ratio:.4g}" for ratio in one.ratios)
-            self.output.say(
-                f"slower: {one.name} by {one.change:.1%} (stored {one.stored.middle:.4g}, measured {agreed})"
-            )
+            self.output.say(f"slower: {one.name} by {one.change:.1%} (stored {one.expected:.4g}, measured {agreed})")
         if len(failed) == len(results):
             self.output.say("nothing was measured")
         return REGRESSION if slower else DONE if results and not failed else FAILED

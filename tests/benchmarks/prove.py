@@ -94,11 +94,12 @@ PLANTS = (
     ),
     Plant(
         "passes",
-        "algorithms/materiality/rows.py",
+        "algorithms/materiality/passes.py",
         (
             (
-                "        for number in range(len(course)):\n",
-                f"        for turn in {_again('len(course)')}:\n            number = turn % len(course)\n",
+                "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n",
+                "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n"
+                "        over_rows(borrow, (self.space.rows * 3 + 9) // 10, threads, share(self.space.rows, threads))\n",  # noqa: E501
             ),
         ),
     ),

@@ -147,7 +147,7 @@ def _started(name: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
 
 
 def passes() -> Work:
-    """Ten over each row, one row after the other, always from the same start."""
+    """Ten over all points, always from the same start."""
     name = "materiality[preset=paper]"
     rho, begin = _started(name)
     apart = evolve(instance(name), counted="row")  # else one count ties all rows together
