@@ -98,10 +98,17 @@ def start_server(preload: Iterable[str]) -> None:
     """
     get_context("forkserver").set_forkserver_preload(list(preload))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    warnings = os.environ.get("PYTHONWARNINGS")
+    # it clears away the semaphores of processes that were ended, and need not tell people
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [warnings, "ignore:resource_tracker:UserWarning"]))
     try:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if warnings is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = warnings
 
 
 def stand_apart() -> None:
