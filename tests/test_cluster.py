@@ -147,6 +147,7 @@ def test_a_worker_that_dies_and_one_that_comes_late(
     assert by_name.reason["loops"] == "stopped after 8 s"
     assert not cells.alone.any()
     assert sorted(told) == sorted([(event, cell.key) for event in ("start", "done") for cell in ready.plan.cells])
+    assert [event for event, _ in told].index("done") <= 4, "two workers, and at most one cell more of each"
     running = list(accumulate(1 if event == "start" else -1 for event, _ in told))
     # a worker begins its next cell while the end of its last one is on its way to us
     assert max(running) <= 7 < len(cells), "three workers, and what the dead one had begun; others wait"
