@@ -13,6 +13,9 @@ from matbench.scene import Scene
 FINER = 8
 """Steps of a coarse level."""
 
+LEAST_SIDE = 64
+"""Pictures are not made smaller than this, px, however many there are."""
+
 _COARSE = 255  # levels of the upper half; 0 is none
 
 # a tenth of the time of lossless WebP, and a third larger

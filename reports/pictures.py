@@ -1,5 +1,6 @@
 """What the page shows of every scene: maps from which a browser draws all pictures, slices, spreads of errors."""
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -10,11 +11,14 @@ from attrs import frozen
 from matbench import coloring
 from matbench.reports import epipolar, errors
 from matbench.reports.content import Report
-from matbench.reports.encoding import Coding, exact, photograph, side_for, size_within
+from matbench.reports.encoding import LEAST_SIDE, Coding, exact, photograph, side_for, size_within
 from matbench.reports.tables import Shared
 from matbench.scene import Scene
 
 _BESIDES = 4  # pictures of a scene besides its methods': the truth, the view, slices
+
+MOST = 13_000_000
+"""Characters that all pictures of a page may take, of the 15 MB that it may."""
 
 
 @frozen(eq=False)
@@ -38,10 +42,27 @@ class Gallery:
     slices: list[list[dict[str, Any]]]
     spreads: errors.Spreads
 
+    @property
+    def characters(self) -> int:
+        """About what it takes on the page."""
+        return len(json.dumps([self.scenes, self.slices]))
 
-def gallery(report: Report, scope: Shared) -> Gallery:
-    """Read every map once, and every volume that was kept."""
+
+def gallery(report: Report, scope: Shared, most: int = MOST) -> Gallery:
+    """All pictures of a run, the smaller the more there are.
+
+    Maps full of noise hardly compress: pictures that take more than `most` characters are drawn anew, smaller.
+    """
     side = side_for((len(scope.methods) + _BESIDES) * len(scope.asked))
+    found = _gallery(report, scope, side)
+    while (taken := found.characters) > most and side > LEAST_SIDE:
+        side = max(LEAST_SIDE, int(side * 0.97 * (most / taken) ** 0.5))
+        found = _gallery(report, scope, side)
+    return found
+
+
+def _gallery(report: Report, scope: Shared, side: int) -> Gallery:
+    """Read every map once, and every volume that was kept."""
     out = Gallery([], [], [], {})
     spreads: dict[tuple[str, str], errors.Spread] = {}
     for name in scope.asked:

@@ -77,7 +77,7 @@ class Machines:
         self.client.close()
         for one in reversed(self.started):
             one.terminate()
-        _, left = psutil.wait_procs(every, timeout=30)
+        _, left = psutil.wait_procs(every, timeout=90)  # a worker itself waits 30 s for its threads
         for one in left:
             one.kill()
         assert not left, "nothing outlives the cluster"
