@@ -1,4 +1,4 @@
-"""The working tree against another commit, measured alternately on the same machine."""
+"""The working tree against another commit, measured in turns on the same machine."""
 
 import os
 import shutil
@@ -7,7 +7,7 @@ import sys
 import tempfile
 import tomllib
 import venv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
@@ -15,12 +15,13 @@ from typing import Any, Literal
 import numpy as np
 from attrs import frozen
 
-from matbench.bench.measuring import ROUNDS, Progress, Sitting, Tree, sit
+from matbench.bench.measuring import ROUNDS, Progress, Tree
+from matbench.bench.turns import Turns, in_turns
 from matbench.errors import UserError
 from matbench.statistics import CONFIDENCE
 
 PAIRS = 4
-"""Pairs of processes, A B, B A, A B, ...: each pair gives one ratio of every subject."""
+"""Pairs of processes: each gives one ratio of every subject, and where their memory lies differs."""
 
 
 @frozen
@@ -37,7 +38,6 @@ class Versus:
     """
 
     name: str
-    group: str
     ratio: float = float("nan")
     low: float = float("nan")
     high: float = float("nan")
@@ -80,6 +80,24 @@ def commit(code: Path, name: str) -> str:
             f"base {name!r} is no commit of {code}: name a branch, a tag or a digest, such as HEAD~1, "
             "and git fetch first what is not here"
         ) from None
+
+
+def accepted(code: Path, file: Path) -> str | None:
+    """The commit that last changed a file of a checkout; None if it is not known.
+
+    It is not where there is no repository or only its newest part (a shallow clone), where the checkout is
+    but a part of another repository, and where the file is not committed as it is.
+    """
+    try:
+        if Path(_git(code, "rev-parse", "--show-toplevel")).resolve() != code.resolve():
+            return None
+        if _git(code, "rev-parse", "--is-shallow-repository") != "false":
+            return None
+        if _git(code, "status", "--porcelain", "--", str(file)):
+            return None
+        return _git(code, "log", "-1", "--format=%H", "--", str(file)) or None
+    except UserError:
+        return None
 
 
 def _needs(code: Path) -> tuple[Any, ...]:
@@ -146,27 +164,24 @@ def _run(python: Path, *arguments: str) -> str:
 def compare(
     here: Tree, base: Tree, names: Sequence[str], pairs: int = PAIRS, rounds: int = ROUNDS, progress: Progress = print
 ) -> list[Versus]:
-    """Both trees timed by the working tree's benchmarks, in processes that alternate."""
-    sittings: dict[bool, list[Sitting]] = {True: [], False: []}
+    """Both trees in turns, by the working tree's benchmarks, in several pairs of processes."""
+    found = []
     for number in range(pairs):
-        for is_here in (number % 2 == 0, number % 2 == 1):
-            progress(f"pair {number + 1} of {pairs}: {'working tree' if is_here else 'base'}")
-            sittings[is_here].append(sit(here if is_here else base, names, rounds, here.code))
-    return [versus(name, sittings[True], sittings[False]) for name in names]
+        progress(f"pair {number + 1} of {pairs}: working tree and base in turns")
+        found.append(in_turns(here, base, names, rounds, number))
+    return [versus(name, [one[name] for one in found]) for name in names]
 
 
-def versus(name: str, here: Sequence[Sitting], base: Sequence[Sitting]) -> Versus:
-    """What pairs of sittings say of a subject."""
-    group = next((one.timings[name].group for one in (*here, *base) if name in one.timings), "")
-    for where, sittings in (("working tree", here), ("base", base)):
-        missing: Mapping[str, str] = next((one.failed for one in sittings if name not in one.timings), {})
-        if missing:
-            return Versus(name, group, reason=f"not in the {where}: {missing.get(name, 'not measured')}")
-    logs = np.log([a.timings[name].ratio / b.timings[name].ratio for a, b in zip(here, base, strict=True)])
+def versus(name: str, pairs: Sequence[Turns]) -> Versus:
+    """What pairs of processes say of a subject."""
+    for one in pairs:
+        if one.reason:
+            return Versus(name, reason=one.reason)
+    logs = np.log([one.ratio for one in pairs])
     ratio = float(np.exp(logs.mean()))
     if logs.size < 2:
-        return Versus(name, group, ratio)
+        return Versus(name, ratio)
     from scipy.stats import t
 
     reach = float(t.ppf((1 + CONFIDENCE) / 2, logs.size - 1) * logs.std(ddof=1) / np.sqrt(logs.size))
-    return Versus(name, group, ratio, ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))
+    return Versus(name, ratio, ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))

@@ -2,62 +2,28 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from math import sqrt
 from pathlib import Path
 from statistics import median
 from typing import Literal
 
 import cattrs
-from attrs import frozen
+from attrs import evolve, frozen
 
 from matbench.bench import machine
-from matbench.bench.load import load
+from matbench.bench.base import Versus
 from matbench.bench.measuring import BENCHMARKS, ROUNDS, Progress, Sitting, Timing, Tree, sit
 from matbench.errors import UserError
 
 MARGIN = 0.15
 """How far a ratio may lie above the stored one, as a share of it."""
 
-STEADY = 1.15
-"""How far apart the ratios with and without load may lie for a slow-down of 1.3 to be seen in both."""
-
 SITTINGS = 3
-"""Fresh processes that decide together: the median of so many must lie beyond the margin."""
+"""Fresh processes that decide together where the commit that stored a ratio is not at hand: their median does."""
 
-UPDATES = 3
-"""Fresh processes whose median is stored, without load; and so many with it."""
+UPDATES = 5
+"""Fresh processes when ratios are stored: that counts in which the reference was quickest."""
 
 Verdict = Literal["ok", "slower", "faster", "new", "failed"]
-
-
-@frozen
-class Stored:
-    """Ratios of a subject: what memory and caches others use slows it more, or less, than the reference.
-
-    Parameters
-    ----------
-    quiet
-        Median of several processes on the machine as it was.
-    loaded
-        The same while memory was streamed on every core, see `matbench.bench.load`.
-    """
-
-    quiet: float
-    loaded: float
-
-    @property
-    def middle(self) -> float:
-        """What is measured is compared with this: nobody knows how much else the machine does meanwhile."""
-        return sqrt(self.quiet * self.loaded)
-
-    @property
-    def steady(self) -> bool:
-        """Whether a slow-down of 1.3 is beyond the limit with and without load."""
-        return max(self.quiet, self.loaded) <= STEADY * min(self.quiet, self.loaded)
-
-    def limit(self, margin: float = MARGIN) -> float:
-        """What is beyond it is slower: the margin above the middle, and half of it above either ratio."""
-        return max(self.middle * (1 + margin), max(self.quiet, self.loaded) * (1 + margin / 2))
 
 
 @frozen
@@ -71,20 +37,20 @@ class Baseline:
     reference
         Digest of the reference workload that ratios are in units of.
     ratios
-        Subject -> its ratios.
+        Subject -> its ratio, of a process that others disturbed least.
     compilation
         The time of compiling all methods, in units of compiling the reference; None if it was not measured.
     """
 
     machine: Mapping[str, str]
     reference: str
-    ratios: Mapping[str, Stored]
+    ratios: Mapping[str, float]
     compilation: float | None = None
 
 
 @frozen
 class Judged:
-    """A subject, what was measured of it in one process after the other, and the verdict.
+    """A subject, what was measured of it, and the verdict.
 
     Parameters
     ----------
@@ -93,9 +59,9 @@ class Judged:
     ratios
         One of each sitting.
     stored
-        None if none is.
-    limit
-        Beyond which it is slower, as a share of the middle of the stored ratios; NaN without.
+        The ratio that is; NaN if none is.
+    against
+        The working tree against the code that the ratio was stored of; None where that was not asked.
     reason
         Why it could not be measured.
     """
@@ -104,8 +70,8 @@ class Judged:
     verdict: Verdict
     timing: Timing | None
     ratios: tuple[float, ...] = ()
-    stored: Stored | None = None
-    limit: float = float("nan")
+    stored: float = float("nan")
+    against: Versus | None = None
     reason: str = ""
 
     @property
@@ -114,14 +80,9 @@ class Judged:
         return median(self.ratios) if self.ratios else float("nan")
 
     @property
-    def expected(self) -> float:
-        """Middle of the stored ratios; NaN if none are."""
-        return self.stored.middle if self.stored else float("nan")
-
-    @property
     def change(self) -> float:
-        """Measured over expected, less one; NaN without either."""
-        return self.ratio / self.expected - 1
+        """How much slower than the stored code, as a share: as measured in turns, else by the ratios."""
+        return self.against.ratio - 1 if self.against else self.ratio / self.stored - 1
 
 
 def folder(tree: Tree) -> Path:
@@ -160,14 +121,10 @@ def write(place: Path, baseline: Baseline) -> Path:
     """Store a baseline in place of what is stored of its kind of machine."""
     path = place / machine.file_name(baseline.machine)
     place.mkdir(parents=True, exist_ok=True)
-    content = {**cattrs.unstructure(baseline), "ratios": {n: _short(one) for n, one in sorted(baseline.ratios.items())}}
+    digits = {name: float(f"{ratio:.4g}") for name, ratio in sorted(baseline.ratios.items())}  # more were not measured
+    content = {**cattrs.unstructure(baseline), "ratios": digits}
     path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     return path
-
-
-def _short(ratios: Stored) -> Mapping[str, float]:
-    """Four digits: more were not measured."""
-    return {key: float(f"{ratio:.4g}") for key, ratio in cattrs.unstructure(ratios).items()}
 
 
 def matching(stored: Sequence[Baseline], kind: Mapping[str, str], reference: str) -> tuple[Baseline | None, str]:
@@ -186,67 +143,73 @@ def matching(stored: Sequence[Baseline], kind: Mapping[str, str], reference: str
     )
 
 
+Decide = Callable[[Sequence[str]], Sequence[Versus]]
+"""The working tree against the code whose ratios are stored, of some subjects."""
+
+
 def judge(
     names: Sequence[str],
     stored: Baseline | None,
     first: Sitting,
     again: Callable[[Sequence[str]], Sitting],
+    decide: Decide | None = None,
     margin: float = MARGIN,
 ) -> list[Judged]:
-    """Compare a sitting with the stored ratios; what looks slow is measured again in fresh processes.
+    """Compare a sitting with the stored ratios, and look closer at what seems slow.
 
-    One process may be unlucky from beginning to end: where its memory lies, who its neighbours are.
-    So a subject whose first ratio is not below its limit by half of the margin sits again until there
-    are `SITTINGS`, and it is slower if their median is beyond the limit: if most of them agree.
+    What other machines' work does to this one moves ratios for minutes, by up to 40 per cent. So a ratio
+    beyond half of the margin raises a suspicion only. It is decided by measuring both codes in turns; where
+    the other is not at hand, or has no such subject, by `SITTINGS` processes whose median must lie beyond it.
 
     Parameters
     ----------
     again
         Measures some subjects in a fresh process.
+    decide
+        None if the code whose ratios are stored is not at hand.
     """
+    old = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
     ratios = {name: [timing.ratio] for name, timing in first.timings.items()}
-    known = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
-    doubtful = {name: old.limit(margin) - old.middle * margin / 2 for name, old in known.items()}
-    suspects = [name for name, bound in doubtful.items() if name in ratios and ratios[name][0] > bound]
-    failed = dict(first.failed)
-    for _ in range(SITTINGS - 1 if suspects else 0):
-        sitting = again(suspects)
+    suspects = [name for name in old if name in ratios and ratios[name][0] > old[name] * (1 + margin / 2)]
+    failed = {name: first.failed.get(name, "not measured") for name in names if name not in ratios}
+    decided = decide(suspects) if suspects and decide is not None else ()
+    against = {one.name: one for one in decided if not one.reason}
+    undecided = [name for name in suspects if name not in against]
+    for _ in range(SITTINGS - 1 if undecided else 0):
+        sitting = again(undecided)
         failed |= sitting.failed
         for name, timing in sitting.timings.items():
             ratios[name].append(timing.ratio)
-    return [
-        Judged(name, "failed", None, (), known.get(name), reason=failed.get(name, "not measured"))
-        if name in failed or name not in ratios
-        else _judged(first.timings[name], name, ratios[name], known.get(name), margin)
-        for name in names
-    ]
 
+    def judged(name: str) -> Judged:
+        if name in failed:
+            return Judged(name, "failed", None, stored=old.get(name, float("nan")), reason=failed[name])
+        found = Judged(name, "ok", first.timings[name], tuple(ratios[name]), old.get(name, float("nan")))
+        if name not in old:
+            return evolve(found, verdict="new")
+        if name in against:
+            slower = against[name].verdict(margin) == "slower"
+            return evolve(found, verdict="slower" if slower else "ok", against=against[name])
+        if found.change > margin:
+            return evolve(found, verdict="slower")
+        return evolve(found, verdict="faster" if found.change < 1 / (1 + margin) - 1 else "ok")
 
-def _judged(timing: Timing, name: str, ratios: Sequence[float], stored: Stored | None, margin: float) -> Judged:
-    if stored is None:
-        return Judged(name, "new", timing, tuple(ratios))
-    found, limit, middle = median(ratios), stored.limit(margin), stored.middle
-    verdict: Verdict = "slower" if found > limit else "faster" if found < middle**2 / limit else "ok"
-    return Judged(name, verdict, timing, tuple(ratios), stored, limit / middle - 1)
+    return [judged(name) for name in names]
 
 
 def establish(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, progress: Progress = lambda _: None) -> Baseline:
-    """The medians of `UPDATES` fresh processes, and of as many while other work is done on every core.
+    """Of `UPDATES` fresh processes, for each subject that in which the reference took least.
 
     Raises
     ------
     UserError
         If a subject cannot be measured.
     """
-    sittings: dict[bool, list[Sitting]] = {False: [], True: []}
-    for loaded, done in sittings.items():
-        with load(loaded):
-            for number in range(UPDATES):
-                progress(f"process {number + 1} of {UPDATES}{' with other work on every core' if loaded else ''}")
-                done.append(sit(tree, names, rounds))
-                for name, reason in done[-1].failed.items():
-                    raise UserError(f"{name} cannot be measured: {reason}")
-    ratios = {
-        name: Stored(*(median(one.timings[name].ratio for one in done) for done in sittings.values())) for name in names
-    }
-    return Baseline(machine.kind(), sittings[False][0].reference, ratios)
+    done: list[Sitting] = []
+    for number in range(UPDATES):
+        progress(f"process {number + 1} of {UPDATES}")
+        done.append(sit(tree, names, rounds))
+        for name, reason in done[-1].failed.items():
+            raise UserError(f"{name} cannot be measured: {reason}")
+    calmest = {name: min((one.timings[name] for one in done), key=lambda timing: timing.reference) for name in names}
+    return Baseline(machine.kind(), done[0].reference, {name: one.ratio for name, one in calmest.items()})

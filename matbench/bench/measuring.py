@@ -35,6 +35,8 @@ class Timing:
         Median over the rounds of subject / reference, one call each, and its 95 % interval within the sitting.
     seconds
         Processor time of one call, the median.
+    reference
+        That of one call of the reference, meanwhile.
     group
         ``method`` or ``kernel``.
     """
@@ -43,6 +45,7 @@ class Timing:
     low: float
     high: float
     seconds: float
+    reference: float
     group: str
     rounds: int
 
@@ -187,8 +190,10 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, tests: Path | No
 def _timing(parts: Sequence[Any]) -> Timing:
     """All rounds of a subject together."""
     ratios = np.concatenate([part["extra_info"]["ratios"] for part in parts])
-    seconds = float(np.median([part["extra_info"]["seconds"] for part in parts]))
-    return Timing(*median_interval(ratios), seconds, parts[0]["group"], ratios.size)
+    seconds, reference = (
+        float(np.median([part["extra_info"][of] for part in parts])) for of in ("seconds", "reference_seconds")
+    )
+    return Timing(*median_interval(ratios), seconds, reference, parts[0]["group"], ratios.size)
 
 
 def run_program(tree: Tree, name: str) -> Any:

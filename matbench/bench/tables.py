@@ -67,14 +67,14 @@ def judged(results: Sequence[Judged]) -> Table:
             seconds(one.timing.seconds) if one.timing else one.reason,
             _number(one.ratio, ".4g"),
             _reach(one.timing),
-            _number(one.expected, ".4g"),
-            _number(one.change, "+.1%"),
-            _number(one.limit, "+.0%"),
+            _number(one.stored, ".4g"),
+            _number(one.ratio / one.stored - 1, "+.1%"),
+            _number(one.against.ratio - 1, "+.1%") if one.against else "",
         )
         for one in results
     )
-    heads = "subject", "verdict", "CPU time", "references", "+-", "stored", "change", "limit"
-    return Table("Times in units of the frozen reference", heads, rows, 2)
+    heads = "subject", "verdict", "time", "refs", "+-", "stored", "by refs", "in turns"
+    return Table("Processor time, and how many references that is", heads, rows, 2)
 
 
 def compared(results: Sequence[Versus], margin: float, base: str) -> Table:

@@ -23,10 +23,10 @@ app = App(
     help_epilogue="""\
 Times mean little on machines that others use, so every method and kernel is measured in turns with a
 frozen reference workload, and what counts is the median of the ratios. What looks slower than the ratio
-stored for this kind of machine is measured again in fresh processes, before it is called so. Ratios are
-stored without and with other work on every core, as that moves some of them. On a kind of machine without
-stored ratios nothing is judged. Exit status: 0 well, 1 something could not be measured, 2 wrong usage,
-3 slower, or other work than counted before.
+stored for this kind of machine is measured in turns with the commit that stored it, before it is called so;
+where that commit is not at hand, again in fresh processes. On a kind of machine without stored ratios
+nothing is judged. Exit status: 0 well, 1 something could not be measured, 2 wrong usage, 3 slower, or
+other work than counted before.
 
 **Examples**
 
@@ -199,18 +199,8 @@ class _Judging:
         stored = attrs.evolve(made, ratios=ratios, compilation=compilation)
         path = baselines.write(self._folder, stored)
         self.output.document |= {"stored": str(path), **attrs.asdict(stored)}
-        self._unsteady(stored)
         self.output.say(f"stored: {path}")
         return DONE
-
-    def _unsteady(self, stored: Any) -> None:
-        """Say whom a slow-down of 1.3 may escape."""
-        names = [name for name in self.names if name in stored.ratios and not stored.ratios[name].steady]
-        if names:
-            self.output.say(
-                f"other load on the machine moves the ratios of {', '.join(names)}: "
-                "their limits are wider, and --base tells smaller differences"
-            )
 
     def check(self, work: bool, compile: bool) -> int:
         """Both layers, and compilation if it is asked for."""
@@ -236,7 +226,7 @@ class _Judging:
         return REGRESSION if changed else DONE
 
     def _times(self) -> int:
-        from matbench.bench import baselines, machine, tables
+        from matbench.bench import base, baselines, machine, tables
         from matbench.bench.measuring import sit
 
         kind = machine.kind()
@@ -248,10 +238,16 @@ class _Judging:
             self.progress(f"again, in a fresh process: {', '.join(suspects)}")
             return sit(self.tree, suspects, self.choice.rounds)
 
-        results = baselines.judge(self.names, stored, first, again, self.choice.margin)
+        def decide(suspects: Sequence[str]) -> Any:
+            with base.base_tree(self.tree, str(commit), self.progress) as other:
+                return base.compare(self.tree, other, suspects, base.PAIRS, self.choice.rounds, self.progress)
+
+        commit = base.accepted(self.tree.code, self._folder / machine.file_name(kind)) if stored else None
+        results = baselines.judge(self.names, stored, first, again, decide if commit else None, self.choice.margin)
         self.output.document |= {
             "machine": kind,
             "judged": stored is not None,
+            "accepted": commit,
             "times": [{**attrs.asdict(one), "ratio": one.ratio, "change": one.change} for one in results],
         }
         self.output.table(tables.judged(results))
@@ -259,11 +255,8 @@ class _Judging:
         slower = [one for one in results if one.verdict == "slower"]
         if stored is None:
             self.output.say(f"not judged: {why}; matbench bench --update stores one")
-        else:
-            self._unsteady(stored)
         for one in slower:
-            agreed = " ".join(f"{ratio:.4g}" for ratio in one.ratios)
-            self.output.say(f"slower: {one.name} by {one.change:.1%} (stored {one.expected:.4g}, measured {agreed})")
+            self.output.say(f"slower: {one.name} by {one.change:.1%}, {_how(one, commit)}")
         if len(failed) == len(results):
             self.output.say("nothing was measured")
         return REGRESSION if slower else DONE if results and not failed else FAILED
@@ -288,6 +281,15 @@ class _Judging:
             return DONE
         self.output.say(f"slower: compilation takes {median(ratios) / budget:.2f} times what is stored")
         return REGRESSION
+
+
+def _how(slower: Any, commit: str | None) -> str:
+    """How that was found."""
+    if slower.against is None:
+        return (
+            f"in {len(slower.ratios)} processes: {' '.join(f'{r:.4g}' for r in slower.ratios)} for {slower.stored:.4g}"
+        )
+    return f"{slower.against.low - 1:.1%} to {slower.against.high - 1:.1%}, in turns with {str(commit)[:8]}"
 
 
 def _against(

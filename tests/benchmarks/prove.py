@@ -2,15 +2,12 @@
 
     python tests/benchmarks/prove.py --tries 20 --folder ../proof
     python tests/benchmarks/prove.py --tries 20 --folder ../proof --load
-    python tests/benchmarks/prove.py --tries 5 --folder ../proof --load --only base
 
-The checkout is copied, and ratios are stored from the copy. Then, in turns: the unchanged copy is measured
-with all subjects, and any alarm is a false one; and copies in whose source a kernel does 30 % more of its
-own work are measured, which must be caught. Kernels whose ratios load moves too far are left out and named:
-``--only base`` measures each planted copy, and a second unchanged one, against the unchanged copy in turns,
-as `matbench bench --base` does. With ``--load``, meanwhile one process per core streams memory. The last
-line is JSON. With ``--folder DIR`` copies and ratios stay there, for the calls that follow: delete it when
-the code has changed.
+The checkout is copied into a git repository of its own, and the ratios that are stored there are committed.
+Then, in turns: the unchanged copy is measured with all subjects, and any alarm is a false one; and copies in
+whose source a kernel does 30 % more of its own work are measured, which must be caught. With ``--load``,
+meanwhile one process per core streams memory. The last line is JSON. With ``--folder DIR`` copies and ratios
+stay there, for the calls that follow: delete it when the code has changed.
 """
 
 import argparse
@@ -21,15 +18,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
+from load import load
+
 from matbench.bench import baselines
-from matbench.bench.base import compare
-from matbench.bench.load import load
-from matbench.bench.measuring import Tree
 
 HERE = Path(__file__).resolve().parents[2]
 FOLDERS = ("algorithms", "datasets", "reports", "matbench", "tests")
@@ -106,16 +101,12 @@ PLANTS = (
 )
 
 
-def copy_checkout(to: Path, plant: Plant | None = None) -> Path:
-    """A copy of the code and its benchmarks; planted if told so. One that is there already stays as it is."""
-    if to.is_dir():
-        return to
-    hidden = shutil.ignore_patterns("__pycache__", ".*", "runs")
+def copy_checkout(to: Path) -> Path:
+    """A copy of the code and its benchmarks, without what is stored of machines."""
+    hidden = shutil.ignore_patterns("__pycache__", ".*", "runs", "baselines")
     for name in FOLDERS:
         shutil.copytree(HERE / name, to / name, symlinks=True, ignore=hidden)
     shutil.copy(HERE / "pyproject.toml", to)
-    if plant is not None:
-        (to / plant.file).write_text(planted(plant), encoding="utf-8")
     return to
 
 
@@ -129,10 +120,17 @@ def planted(plant: Plant) -> str:
     return text
 
 
-def bench(code: Path, cache: Path, *arguments: str) -> tuple[int, dict[str, Any]]:
-    """`matbench bench --json` of a copy: its exit status and what it said."""
+def repository(code: Path) -> None:
+    """What is in a folder, as the first or the next commit of a git repository."""
+    git = ["git", "-C", str(code), "-c", "user.name=Proof", "-c", "user.email=proof@example.org"]
+    for arguments in (["init", "-q"], ["add", "-A"], ["commit", "-q", "--allow-empty", "-m", "as it is"]):
+        subprocess.run([*git, *arguments], check=True)
+
+
+def bench(code: Path, cache: Path, *arguments: str) -> dict[str, Any]:
+    """What `matbench bench --json` says of a copy."""
     done = subprocess.run(
-        [sys.executable, "-m", "matbench", "bench", "--json", *arguments],
+        [sys.executable, "-m", "matbench", "bench", "--json", "--no-work", *arguments],
         cwd=code,
         env={**os.environ, "XDG_CACHE_HOME": str(cache)},
         capture_output=True,
@@ -141,112 +139,90 @@ def bench(code: Path, cache: Path, *arguments: str) -> tuple[int, dict[str, Any]
     )
     if done.returncode not in (0, 3):
         raise SystemExit(f"matbench bench ended with {done.returncode}: {done.stderr.strip()[-400:]}")
-    return done.returncode, json.loads(done.stdout)
-
-
-def _slower(found: dict[str, Any]) -> dict[str, float]:
-    return {one["name"]: one["change"] for one in found["times"] if one["verdict"] == "slower"}
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
 class Proof:
-    """Copies of the code in a folder, and the ratios that are stored of the unchanged one."""
+    """Copies of the code in a folder, each with what the unchanged one stored in its last commit."""
 
     def __init__(self, place: Path, margin: str):
-        self._place, self._cache = place, place / "cache"
-        self._stored = ("--baselines", str(place / "baselines"))
-        self._judged = ("--no-work", "--margin", margin, *self._stored)
-        self.clean = copy_checkout(place / "clean")
-        if not (place / "baselines").is_dir():
-            print("storing ratios of the unchanged copy, without and with load", flush=True)
-            bench(self.clean, self._cache, "--update", "--no-work", *self._stored)
-        (stored,) = baselines.read(place / "baselines")
-        self.steady = [plant for plant in PLANTS if stored.ratios[plant.subject].steady]
+        self._cache, self._margin = place / "cache", margin
+        self.clean = place / "clean"
+        if not self.clean.is_dir():
+            print("storing ratios of the unchanged copy", flush=True)
+            repository(copy_checkout(self.clean))
+            bench(self.clean, self._cache, "--update")
+            repository(self.clean)
+        self._planted = {plant.subject: place / plant.subject.replace(" ", "-") for plant in PLANTS}
         for plant in PLANTS:
-            ratio = stored.ratios[plant.subject]
-            left = "" if plant in self.steady else ": left to --only base"
-            print(f"{plant.subject:12} with load {ratio.loaded / ratio.quiet - 1:+.1%}{left}", flush=True)
-        self._planted = {
-            plant.subject: copy_checkout(place / plant.subject.replace(" ", "-"), plant) for plant in PLANTS
-        }
+            code = self._planted[plant.subject]
+            if not code.is_dir():
+                shutil.copytree(self.clean, code, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+                (code / plant.file).write_text(planted(plant), encoding="utf-8")
 
-    def compile(self, plants: Sequence[Plant]) -> None:
+    def compile(self) -> None:
         """Before anything is counted."""
-        for plant in plants:
+        for plant in PLANTS:
             self.catch(plant, "--rounds", "5")
 
     def catch(self, plant: Plant, *more: str) -> dict[str, Any]:
         """Measure a planted copy once."""
         code = self._planted[plant.subject]
-        _, found = bench(code, self._cache, "--only", plant.subject, *more, *self._judged)
-        (one,) = found["times"]
+        (one,) = bench(code, self._cache, "--only", plant.subject, "--margin", self._margin, *more)["times"]
         return {"subject": plant.subject, "caught": one["verdict"] == "slower", "change": one["change"]}
 
-    def alarms(self) -> tuple[dict[str, float], float]:
-        """Measure the unchanged copy once: what is called slower, and the greatest change."""
-        _, found = bench(self.clean, self._cache, *self._judged)
-        return _slower(found), max(one["change"] for one in found["times"])
-
-    def against(self, plant: Plant | None, subject: str) -> dict[str, Any]:
-        """Measure a planted copy, or a second unchanged one, against the unchanged copy in turns."""
-        code = self._planted[subject] if plant else copy_checkout(self._place / "twin")
-        trees = [Tree(each, Path(sys.executable), self._place / "kernels" / each.name) for each in (code, self.clean)]
-        (found,) = compare(*trees, [subject], progress=lambda _: None)
-        verdict = found.verdict(baselines.MARGIN)
-        return {"subject": subject, "caught": verdict == "slower", "change": found.ratio - 1, "low": found.low - 1}
+    def alarms(self) -> tuple[list[str], dict[str, float]]:
+        """Measure the unchanged copy once: what is called slower; how much slower is what was looked at closer."""
+        times = bench(self.clean, self._cache, "--margin", self._margin)["times"]
+        closer = {one["name"]: one["change"] for one in times if one["against"]}
+        return [one["name"] for one in times if one["verdict"] == "slower"], closer
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tries", type=int, default=20, help="of either kind")
     parser.add_argument("--load", action="store_true", help="with other work on every core")
-    parser.add_argument(
-        "--only", choices=("caught", "alarms", "base"), help="one of the two counts, or those of --base"
-    )
+    parser.add_argument("--only", choices=("caught", "alarms"), help="one of the two counts")
     parser.add_argument("--folder", type=Path, help="keep copies and ratios there; default: nothing is kept")
     parser.add_argument("--margin", default=str(baselines.MARGIN))
     asked = parser.parse_args()
     if asked.tries < 1:
         parser.error(f"--tries {asked.tries}: at least 1")
     catches: list[dict[str, Any]] = []
-    alarms: list[Mapping[str, float]] = []
-    worst: list[float] = []
+    alarms: list[list[str]] = []
+    closer: list[dict[str, float]] = []
     with tempfile.TemporaryDirectory(prefix="matbench-proof-") as passing:
         proof = Proof((asked.folder or Path(passing)).resolve(), asked.margin)
-        plants: Sequence[Plant] = PLANTS if asked.only == "base" else proof.steady
-        if asked.only in (None, "caught"):
-            proof.compile(plants)
+        if asked.only != "alarms":
+            proof.compile()
         began = time.monotonic()
         with load(asked.load):
             for number in range(asked.tries):
-                if asked.only != "alarms" and plants:
-                    plant = plants[number % len(plants)]
-                    one = proof.against(plant, plant.subject) if asked.only == "base" else proof.catch(plant)
+                if asked.only != "alarms":
+                    one = proof.catch(PLANTS[number % len(PLANTS)])
                     catches.append(one)
                     said = "caught" if one["caught"] else "missed"
-                    print(f"{number + 1:3} planted in {plant.subject:12} {one['change']:+.1%} {said}", flush=True)
-                if asked.only == "base":
-                    one = proof.against(None, plants[number % len(plants)].subject)
-                    alarms.append({one["subject"]: one["change"]} if one["caught"] else {})
-                    worst.append(one["change"])
-                elif asked.only != "caught":
-                    found, change = proof.alarms()
-                    alarms.append(found)
-                    worst.append(change)
+                    print(f"{number + 1:3} planted in {one['subject']:12} {one['change']:+.1%} {said}", flush=True)
                 if asked.only != "caught":
-                    said = ", ".join(alarms[-1]) or "no alarm"
-                    print(f"{number + 1:3} unchanged: {said}; the slowest {worst[-1]:+.1%}", flush=True)
+                    slower, looked_at = proof.alarms()
+                    alarms.append(slower)
+                    closer.append(looked_at)
+                    said = ", ".join(f"{name} {change:+.1%}" for name, change in looked_at.items()) or "nothing"
+                    told = f"called slower: {', '.join(slower)}" if slower else "no alarm"
+                    print(f"{number + 1:3} unchanged: {told}; measured in turns: {said}", flush=True)
     changes = {p.subject: [c["change"] for c in catches if c["subject"] == p.subject] for p in PLANTS}
     summary = {
         "load": asked.load,
         "tries": asked.tries,
-        "left_to_base": [plant.subject for plant in PLANTS if plant not in plants],
         "caught": sum(c["caught"] for c in catches),
         "planted": len(catches),
         "measured": {name: median(found) for name, found in changes.items() if found},
         "least_measured": min((c["change"] for c in catches), default=None),
         "false_alarms": sum(map(bool, alarms)),
         "unchanged": len(alarms),
-        "largest_change_of_unchanged": max(worst, default=None),
+        "measured_in_turns": sum(map(len, closer)),
+        "largest_change_in_turns": max((change for one in closer for change in one.values()), default=None),
         "minutes": round((time.monotonic() - began) / 60, 1),
     }
     print(f"caught {summary['caught']} of {len(catches)}; false alarms {summary['false_alarms']} of {len(alarms)}")

@@ -5,7 +5,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 NUMBERS = 1 << 24  # of each of two arrays: 128 MiB a process, beyond all caches
 
@@ -13,9 +12,7 @@ NUMBERS = 1 << 24  # of each of two arrays: 128 MiB a process, beyond all caches
 @contextmanager
 def load(wanted: bool = True) -> Iterator[None]:
     """One process a core streams memory meanwhile; none if it is not wanted."""
-    command = [sys.executable, "-m", "matbench.bench.load"]
-    code = Path(__file__).resolve().parents[2]
-    others = [subprocess.Popen(command, cwd=code) for _ in range((os.cpu_count() or 1) * wanted)]  # noqa: S603
+    others = [subprocess.Popen([sys.executable, __file__]) for _ in range((os.cpu_count() or 1) * wanted)]
     try:
         yield
     finally:

@@ -1,0 +1,150 @@
+"""Two trees measured in turns, some milliseconds each, in two processes on one core.
+
+What else the machine does slows both alike, whatever it is: so their ratio tells what a ratio to a reference
+workload cannot, a small change on a machine that is never at rest.
+"""
+
+import json
+import os
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from statistics import median
+from types import TracebackType
+from typing import IO, Self
+
+from attrs import frozen
+
+from matbench.bench.measuring import BENCHMARKS, Tree, environment
+from matbench.errors import UserError
+
+SLICE = 0.004  # seconds of a turn at least
+ENOUGH, FEWEST = 0.4, 7  # seconds after which a long subject has had turns enough, but never fewer turns
+
+
+@frozen
+class Turns:
+    """A subject in a pair of processes.
+
+    Parameters
+    ----------
+    ratio
+        Median over the turns of the time of the one tree / that of the other; NaN without.
+    reason
+        Why there is none.
+    """
+
+    ratio: float = float("nan")
+    reason: str = ""
+
+
+def in_turns(
+    here: Tree, base: Tree, names: Sequence[str], rounds: int, number: int = 0, tests: Path | None = None
+) -> Mapping[str, Turns]:
+    """Subjects in a fresh pair of processes, subject after subject.
+
+    Parameters
+    ----------
+    rounds
+        Turns of each; fewer of what takes long.
+    number
+        Of the pair: pairs take the cores, and who begins, in turns.
+    tests
+        The checkout whose tests/benchmarks do it; `here` by default.
+
+    Raises
+    ------
+    UserError
+        If a process measures other code than its tree's.
+    """
+    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [0]
+    core = cores[number % len(cores)]
+    with ExitStack() as stack:
+
+        def side(name: str, tree: Tree) -> _Side:
+            said = stack.enter_context(tempfile.TemporaryFile("w+"))
+            return stack.enter_context(_Side(name, tree, tests or here.code, core, said))
+
+        one, other = side("working tree", here), side("base", base)
+        one.begin()
+        other.begin()
+        return {name: _turns(one, other, name, rounds, number) for name in names}
+
+
+def _turns(here: "_Side", base: "_Side", name: str, rounds: int, number: int) -> Turns:
+    try:
+        call = max(here.seconds(name, 0), base.seconds(name, 0))
+        calls = max(1, round(SLICE / max(call, 1e-6)))
+        enough = max(FEWEST, round(ENOUGH / (calls * call)))
+        ratios = []
+        for turn in range(min(rounds, enough)):
+            first, second = (here, base) if (turn + number) % 2 == 0 else (base, here)
+            taken = {side: side.seconds(name, calls) for side in (first, second)}
+            ratios.append(taken[here] / taken[base])
+    except _NotMeasured as error:
+        return Turns(reason=str(error))
+    return Turns(median(ratios))
+
+
+class _NotMeasured(Exception):
+    """Says where, and why."""
+
+
+class _Side:
+    """A process that does the subjects of a tree's code when it is told to."""
+
+    def __init__(self, name: str, tree: Tree, tests: Path, core: int, said: IO[str]):
+        self._name, self._tree, self._said = name, tree, said
+        program = f"import sys; sys.path.append({str(tests / BENCHMARKS)!r}); import in_turns; in_turns.main()"
+        self._process = subprocess.Popen(  # noqa: S603 (this interpreter, no shell)
+            [str(tree.python), "-c", program, str(core)],
+            cwd=tree.code,
+            env=environment(tree),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            text=True,
+            bufsize=1,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def begin(self) -> None:
+        """Wait until it is there."""
+        try:
+            code = self._answer()["code"]
+        except _NotMeasured as error:
+            raise UserError(f"nothing was measured: {error}") from None
+        if Path(str(code)) != self._tree.code.resolve():
+            raise UserError(f"{code} was measured instead of {self._tree.code}: is another matbench before it?")
+
+    def seconds(self, name: str, calls: int) -> float:
+        """Of so many calls; of one for 0, which makes the subject ready."""
+        try:
+            print(json.dumps([name, calls]), file=self._process.stdin, flush=True)
+        except BrokenPipeError:
+            raise self._gone() from None
+        answer = self._answer()
+        if "failed" in answer:
+            raise _NotMeasured(f"not in the {self._name}: {answer['failed']}")
+        return float(str(answer["seconds"]))
+
+    def _answer(self) -> Mapping[str, object]:
+        line = self._process.stdout.readline() if self._process.stdout else ""
+        if not line:
+            raise self._gone()
+        found: Mapping[str, object] = json.loads(line)
+        return found
+
+    def _gone(self) -> _NotMeasured:
+        self._process.wait()
+        self._said.seek(0)
+        said = [line.strip() for line in self._said if line.strip()]
+        return _NotMeasured(f"not in the {self._name}: {said[-1] if said else f'status {self._process.returncode}'}")
