@@ -53,10 +53,11 @@ def gallery(report: Report, scope: Shared, most: int = MOST) -> Gallery:
 
     Maps full of noise hardly compress: pictures that take more than `most` characters are drawn anew, smaller.
     """
-    side = side_for((len(scope.methods) + _BESIDES) * len(scope.asked))
+    longest = max((max(scene.height, scene.width) for scene in report.scenes.values()), default=LEAST_SIDE)
+    side = min(side_for((len(scope.methods) + _BESIDES) * len(scope.asked)), longest)
     found = _gallery(report, scope, side)
     while (taken := found.characters) > most and side > LEAST_SIDE:
-        side = max(LEAST_SIDE, int(side * 0.97 * (most / taken) ** 0.5))
+        side = max(LEAST_SIDE, int(0.95 * side * (most / taken) ** 0.5))  # fewer pixels compress a little worse
         found = _gallery(report, scope, side)
     return found
 

@@ -33,7 +33,7 @@ def labelled(frame: pd.DataFrame) -> pd.DataFrame:
     if "method" in frame:
         return frame
     out = frame.copy()
-    out["params"] = out["params"].fillna("").astype(str)
+    out["params"] = out["params"].astype(object).where(out["params"].notna(), "").astype(str)
     out["method"] = [label(a, p) for a, p in zip(out["algorithm"], out["params"], strict=True)]
     if "seed" not in out:
         out["seed"] = 0

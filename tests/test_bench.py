@@ -21,12 +21,12 @@ from matbench.bench import base, baselines, counting, growth, growth_report, mac
 from matbench.bench.baselines import Baseline, Judged
 from matbench.bench.measuring import Sitting, Timing, Tree
 from matbench.bench.roofline import Roofline
-from matbench.bench.turns import Turns
+from matbench.bench.turns import Turns, in_turns
 from matbench.cli import main
 from matbench.errors import UserError
 
 KIND = {"processor": "Some(R) Processor 6/1/2", "cores": "2", "numba": "0.68"}
-STORED = Baseline(KIND, "digest", {"one": 10, "two": 20})
+STORED = Baseline(KIND, "digest", "code", {"one": 10, "two": 20})
 
 
 def sitting(**ratios: float) -> Sitting:
@@ -34,7 +34,7 @@ def sitting(**ratios: float) -> Sitting:
 
 
 def verdicts(
-    first: Sitting, *later: float, decide: baselines.Decide | None = None
+    first: Sitting, *later: float, decide: baselines.Decide = lambda _: ()
 ) -> tuple[list[Judged], list[Sequence[str]]]:
     """What is judged of two subjects, and who was asked to sit again; the first then measures `later`."""
     asked: list[Sequence[str]] = []
@@ -118,7 +118,7 @@ def test_what_is_as_fast_as_before_is_measured_once() -> None:
 
 def test_what_could_not_be_measured_failed_and_what_is_not_stored_is_new() -> None:
     first = evolve(sitting(three=3.0), failed={"one": "ValueError: no"})
-    one, three = baselines.judge(["one", "three"], STORED, first, lambda _: pytest.fail("nobody is suspect"))
+    one, three = baselines.judge(["one", "three"], STORED, first, *[lambda _: pytest.fail("nobody is suspect")] * 2)
     assert (one.verdict, one.reason, three.verdict) == ("failed", "ValueError: no", "new")
     assert "ValueError: no" in tables.judged([one, three]).markdown()
 
@@ -127,14 +127,14 @@ def test_ratios_are_stored_for_a_kind_of_machine(tmp_path: Path) -> None:
     path = baselines.write(tmp_path, STORED)
     assert path.name.startswith("some-processor-6-1-2-")
     assert baselines.read(tmp_path) == [STORED]
-    assert baselines.matching([STORED], KIND, "digest") == (STORED, "")
-    found, why = baselines.matching([STORED], {**KIND, "numba": "0.69"}, "digest")
+    assert baselines.matching(tmp_path, KIND, "digest") == (STORED, "")
+    found, why = baselines.matching(tmp_path, {**KIND, "numba": "0.69"}, "digest")
     assert found is None
     assert "numba 0.68 -> 0.69" in why
-    assert baselines.matching([STORED], KIND, "another")[0] is None
-    assert baselines.matching([], KIND, "digest")[0] is None
+    assert baselines.matching(tmp_path, KIND, "another")[0] is None
+    assert baselines.matching(tmp_path / "empty", KIND, "digest") == (None, "no baseline is stored")
     assert baselines.replaced(tmp_path, evolve(STORED, ratios={})) == STORED
-    assert baselines.replaced(tmp_path, evolve(STORED, reference="another")) is None
+    assert baselines.replaced(tmp_path, evolve(STORED, digest="another")) is None
     path.write_text("{", encoding="utf-8")
     assert baselines.replaced(tmp_path, STORED) is None  # and --update writes it anew
     with pytest.raises(UserError, match="no stored baseline"):
@@ -144,7 +144,7 @@ def test_ratios_are_stored_for_a_kind_of_machine(tmp_path: Path) -> None:
 def test_stored_files_are_of_this_reference() -> None:
     """A changed reference makes every stored ratio worthless: measure them anew, or change it back."""
     folder = Path(__file__).parent / "benchmarks" / "baselines"
-    assert all(one.reference == digest() for one in baselines.read(folder))
+    assert all(one.digest == digest() for one in baselines.read(folder))
     assert all(machine.file_name(one.machine) in {p.name for p in folder.iterdir()} for one in baselines.read(folder))
 
 
@@ -170,6 +170,37 @@ def test_pairs_of_processes_give_a_ratio_with_an_interval() -> None:
     gone = base.versus("one", [*slower, Turns(reason="not in the base: AttributeError: none")])
     assert gone.verdict(0.15) == "not compared"
     assert gone.reason == "not in the base: AttributeError: none"
+
+
+def test_what_is_unsure_is_measured_in_as_many_pairs_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    asked: list[Sequence[str]] = []
+
+    def pair(_: Tree, __: Tree, names: Sequence[str], ___: int, number: int) -> dict[str, Turns]:
+        asked.append(list(names))
+        disturbed = 0.8 if number == 1 else 1.3
+        return {"calm": Turns(1.0 + number / 1000), "disturbed": Turns(disturbed), "gone": Turns(reason="no")}
+
+    monkeypatch.setattr(base, "in_turns", pair)
+    tree = Tree(tmp_path, tmp_path, tmp_path)
+    found = base.compare(tree, tree, ["calm", "disturbed", "gone"], 0.15, pairs=4, progress=lambda _: None)
+    assert [one.verdict(0.15) for one in found] == ["same", "slower", "not compared"]
+    assert asked[:4] == [["calm", "disturbed", "gone"]] * 4
+    assert asked[4:] == [["disturbed"]] * 4
+
+
+def test_a_side_that_fails_is_told_with_its_reason(tmp_path: Path) -> None:
+    here, cache = Path(__file__).resolve().parents[1], tmp_path / "kernels"
+    whole = Tree(here, Path(sys.executable), cache)
+    code = prove.copy_checkout(tmp_path / "code")
+    (code / "matbench" / "algorithms" / "semiglobal.py").write_text('raise SystemExit("broken off")\n')
+    (code / "matbench" / "algorithms" / "sgbm.py").write_text("SGBM = None\n")
+    found = in_turns(whole, Tree(code, whole.python, tmp_path / "others"), ["sgbm", "winner", "voxel pooling"], 3)
+    assert found["sgbm"].reason == "not in the base: TypeError: 'NoneType' object is not callable"
+    assert found["winner"].reason == "not in the base: SystemExit: broken off"
+    assert found["voxel pooling"].ratio > 0, "a subject that fails costs no other"
+    assert np.isnan(found["winner"].ratio)
+    with pytest.raises(UserError, match="was measured instead of"):
+        in_turns(evolve(whole, code=tmp_path), whole, ["sgbm"], 3, tests=here)
 
 
 def test_changed_counters_are_told_one_by_one() -> None:
@@ -230,6 +261,7 @@ def test_growth_is_drawn_with_the_peer_and_the_ideal(tmp_path: Path) -> None:
         (["--base", "no-such-commit"], "base 'no-such-commit' is no commit"),
         (["--base=--help-me"], "base '--help-me' is no commit"),
         (["--update", "--base", "HEAD"], "three different things"),
+        (["--update", "--only", "sgbm"], "leave out --only sgbm"),
         (["--out", "x"], "add --scaling"),
         (["--scaling", "--only", "nobody"], "unknown method 'nobody'"),
         (["--pairs", "1", "--base", "HEAD"], "one pair has no interval"),
@@ -269,9 +301,9 @@ def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path)
     assert "not judged: no baseline is stored" in new.stdout
     (first,) = json.loads(new.stdout)["times"]
     # as if it had been stored on a calmer machine: what seems slower is decided in turns
-    stored = Baseline(machine.kind(), digest(), {"voxel pooling": first["ratio"] / 1.5})
+    stored = Baseline(machine.kind(), digest(), baselines.code_digest(code), {"voxel pooling": first["ratio"] / 3})
     path = baselines.write(baselines.folder(Tree(code, Path(sys.executable), tmp_path)), stored)
-    assert base.accepted(code, path) is None, "no repository"
+    assert base.last_change(code, path) is None, "no repository"
     prove.repository(code)
     unchanged = _run(code, *chosen, *judged)
     assert unchanged.returncode == 0, unchanged.stdout
@@ -290,7 +322,7 @@ def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path)
     assert slower.returncode == 3, slower.stdout
     found = json.loads(slower.stdout)
     assert found["times"][0]["verdict"] == "slower"
-    assert found["accepted"] == base.accepted(code, path)
+    assert found["accepted"] == base.last_change(code, path)
     assert f"in turns with {found['accepted'][:8]}" in found["said"][-1]
 
     against = _run(code, *chosen, "--base", "HEAD", "--pairs", "2", "--markdown")
@@ -301,9 +333,9 @@ def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path)
 
     shallow = tmp_path / "shallow"
     subprocess.run(["git", "clone", "-q", "--depth", "1", f"file://{code}", shallow], check=True)
-    assert base.accepted(shallow, shallow / path.relative_to(code)) is None
+    assert base.last_change(shallow, shallow / path.relative_to(code)) is None
     path.write_text(path.read_text(encoding="utf-8") + " ", encoding="utf-8")
-    assert base.accepted(code, path) is None, "not committed as it is"
+    assert base.last_change(code, path) is None, "not committed as it is"
 
 
 def test_without_a_checkout_it_says_so(tmp_path: Path) -> None:

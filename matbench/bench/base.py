@@ -8,7 +8,7 @@ import tempfile
 import tomllib
 import venv
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -82,20 +82,20 @@ def commit(code: Path, name: str) -> str:
         ) from None
 
 
-def accepted(code: Path, file: Path) -> str | None:
+def last_change(code: Path, file: Path) -> str | None:
     """The commit that last changed a file of a checkout; None if it is not known.
 
     It is not where there is no repository or only its newest part (a shallow clone), where the checkout is
     but a part of another repository, and where the file is not committed as it is.
     """
     try:
-        if Path(_git(code, "rev-parse", "--show-toplevel")).resolve() != code.resolve():
+        if not file.is_file() or Path(_git(code, "rev-parse", "--show-toplevel")).resolve() != code.resolve():
             return None
         if _git(code, "rev-parse", "--is-shallow-repository") != "false":
             return None
-        if _git(code, "status", "--porcelain", "--", str(file)):
+        if _git(code, "status", "--porcelain", "--", str(file.resolve())):
             return None
-        return _git(code, "log", "-1", "--format=%H", "--", str(file)) or None
+        return _git(code, "rev-list", "-1", "HEAD", "--", str(file.resolve())) or None
     except UserError:
         return None
 
@@ -117,10 +117,10 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
     Where it declares the same dependencies as the working tree, its environment shares the libraries
     that are installed here: the same versions, and no network is needed. Else they are installed.
     """
-    with tempfile.TemporaryDirectory(prefix="matbench-base-") as place:
-        code = Path(place, "code")
-        _git(here.code, "worktree", "add", "--detach", "--quiet", str(code), digest)
-        try:
+    try:
+        with tempfile.TemporaryDirectory(prefix="matbench-base-") as place:
+            code = Path(place, "code")
+            _git(here.code, "worktree", "add", "--detach", "--quiet", str(code), digest)
             environment = Path(place, "venv")
             if _needs(code) == _needs(here.code):
                 progress(f"base {digest[:8]}: the libraries that are installed here")
@@ -133,8 +133,9 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
                 python = _python(environment)
                 _run(python, "-m", "pip", "install", "--quiet", "--editable", f"{code}[test]")
             yield Tree(code, python, Path(place, "kernels"))
-        finally:
-            _git(here.code, "worktree", "remove", "--force", str(code))
+    finally:
+        with suppress(UserError):
+            _git(here.code, "worktree", "prune")
 
 
 def _python(environment: Path) -> Path:
@@ -162,14 +163,30 @@ def _run(python: Path, *arguments: str) -> str:
 
 
 def compare(
-    here: Tree, base: Tree, names: Sequence[str], pairs: int = PAIRS, rounds: int = ROUNDS, progress: Progress = print
+    here: Tree,
+    base: Tree,
+    names: Sequence[str],
+    margin: float,
+    pairs: int = PAIRS,
+    rounds: int = ROUNDS,
+    progress: Progress = print,
 ) -> list[Versus]:
-    """Both trees in turns, by the working tree's benchmarks, in several pairs of processes."""
-    found = []
-    for number in range(pairs):
-        progress(f"pair {number + 1} of {pairs}: working tree and base in turns")
-        found.append(in_turns(here, base, names, rounds, number))
-    return [versus(name, [one[name] for one in found]) for name in names]
+    """Both trees in turns, by the working tree's benchmarks, in several pairs of processes.
+
+    What is unsure after them is measured in as many again.
+    """
+    taken: dict[str, list[Turns]] = {name: [] for name in names}
+    found: dict[str, Versus] = {}
+    unsure = list(names)
+    for number in range(2 * pairs):
+        if number == pairs:
+            unsure = [name for name, one in found.items() if one.verdict(margin) == "unsure"]
+        if unsure:
+            progress(f"pair {number + 1} of {pairs if number < pairs else 2 * pairs}: working tree and base in turns")
+            for name, turns in in_turns(here, base, unsure, rounds, number).items():
+                taken[name].append(turns)
+        found = {name: versus(name, pairs_of_it) for name, pairs_of_it in taken.items()}
+    return list(found.values())
 
 
 def versus(name: str, pairs: Sequence[Turns]) -> Versus:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
 from statistics import median
 from typing import Literal
@@ -15,7 +16,7 @@ from matbench.bench.measuring import BENCHMARKS, ROUNDS, Progress, Sitting, Timi
 from matbench.errors import UserError
 
 MARGIN = 0.15
-"""How far a ratio may lie above the stored one, as a share of it."""
+"""How much more time than the stored code a subject may take, as a share of it."""
 
 SITTINGS = 3
 """Fresh processes that decide together where the commit that stored a ratio is not at hand: their median does."""
@@ -23,7 +24,7 @@ SITTINGS = 3
 UPDATES = 5
 """Fresh processes when ratios are stored: that counts in which the reference was quickest."""
 
-Verdict = Literal["ok", "slower", "faster", "new", "failed"]
+Verdict = Literal["ok", "slower", "faster", "unsure", "new", "failed"]
 
 
 @frozen
@@ -34,16 +35,19 @@ class Baseline:
     ----------
     machine
         See `machine.kind`.
-    reference
-        Digest of the reference workload that ratios are in units of.
+    digest
+        Of the reference workload that ratios are in units of, and of the subjects.
+    code
+        Digest of the methods' code whose ratios they are, see `code_digest`.
     ratios
-        Subject -> its ratio, of a process that others disturbed least.
+        Subject -> its ratio, of the process that others disturbed least.
     compilation
         The time of compiling all methods, in units of compiling the reference; None if it was not measured.
     """
 
     machine: Mapping[str, str]
-    reference: str
+    digest: str
+    code: str
     ratios: Mapping[str, float]
     compilation: float | None = None
 
@@ -90,6 +94,14 @@ def folder(tree: Tree) -> Path:
     return tree.code / BENCHMARKS / "baselines"
 
 
+def code_digest(code: Path) -> str:
+    """SHA-256 of the methods of a checkout."""
+    digest = sha256()
+    for file in sorted((code / "algorithms").rglob("*.py")):
+        digest.update(f"{file.relative_to(code).as_posix()}\0".encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
 def read(place: Path) -> list[Baseline]:
     """All baselines in a folder.
 
@@ -114,7 +126,7 @@ def replaced(place: Path, baseline: Baseline) -> Baseline | None:
         before = _read(place / machine.file_name(baseline.machine))
     except UserError:
         return None
-    return before if before.reference == baseline.reference else None
+    return before if before.digest == baseline.digest else None
 
 
 def write(place: Path, baseline: Baseline) -> Path:
@@ -127,20 +139,24 @@ def write(place: Path, baseline: Baseline) -> Path:
     return path
 
 
-def matching(stored: Sequence[Baseline], kind: Mapping[str, str], reference: str) -> tuple[Baseline | None, str]:
-    """The baseline of this kind of machine; else None, and in words what the nearest one differs in."""
-    for baseline in stored:
-        if baseline.machine == kind:
-            if baseline.reference == reference:
-                return baseline, ""
-            return None, "the reference workload is another one than that of the stored baseline"
+def matching(place: Path, kind: Mapping[str, str], digest: str) -> tuple[Baseline | None, str]:
+    """The baseline of this kind of machine; else None, and in words what the nearest one differs in.
+
+    Raises
+    ------
+    UserError
+        If a file there is no baseline.
+    """
+    stored = {path.name: _read(path) for path in sorted(place.glob("*.json"))}
     if not stored:
         return None, "no baseline is stored"
-    nearest = min(stored, key=lambda one: len(machine.differences(one.machine, kind)))
-    return (
-        None,
-        f"no baseline is stored for this kind of machine ({'; '.join(machine.differences(nearest.machine, kind))})",
-    )
+    baseline = stored.get(machine.file_name(kind))
+    if baseline is None or baseline.machine != kind:
+        differing = sorted((machine.differences(one.machine, kind) for one in stored.values()), key=len)
+        return None, f"no baseline is stored for this kind of machine ({'; '.join(differing[0])})"
+    if baseline.digest != digest:
+        return None, "what is timed, or the reference workload, is another than that of the stored baseline"
+    return baseline, ""
 
 
 Decide = Callable[[Sequence[str]], Sequence[Versus]]
@@ -152,7 +168,7 @@ def judge(
     stored: Baseline | None,
     first: Sitting,
     again: Callable[[Sequence[str]], Sitting],
-    decide: Decide | None = None,
+    decide: Decide,
     margin: float = MARGIN,
 ) -> list[Judged]:
     """Compare a sitting with the stored ratios, and look closer at what seems slow.
@@ -166,13 +182,13 @@ def judge(
     again
         Measures some subjects in a fresh process.
     decide
-        None if the code whose ratios are stored is not at hand.
+        Measures some subjects in turns with the code whose ratios are stored; nothing if that is not at hand.
     """
     old = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
     ratios = {name: [timing.ratio] for name, timing in first.timings.items()}
     suspects = [name for name in old if name in ratios and ratios[name][0] > old[name] * (1 + margin / 2)]
-    failed = {name: first.failed.get(name, "not measured") for name in names if name not in ratios}
-    decided = decide(suspects) if suspects and decide is not None else ()
+    failed = {name: "not measured" for name in names if name not in ratios} | dict(first.failed)
+    decided = decide(suspects) if suspects else ()
     against = {one.name: one for one in decided if not one.reason}
     undecided = [name for name in suspects if name not in against]
     for _ in range(SITTINGS - 1 if undecided else 0):
@@ -188,8 +204,8 @@ def judge(
         if name not in old:
             return evolve(found, verdict="new")
         if name in against:
-            slower = against[name].verdict(margin) == "slower"
-            return evolve(found, verdict="slower" if slower else "ok", against=against[name])
+            slower, unsure = (against[name].verdict(margin) == word for word in ("slower", "unsure"))
+            return evolve(found, verdict="slower" if slower else "unsure" if unsure else "ok", against=against[name])
         if found.change > margin:
             return evolve(found, verdict="slower")
         return evolve(found, verdict="faster" if found.change < 1 / (1 + margin) - 1 else "ok")
@@ -212,4 +228,5 @@ def establish(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, progress: 
         for name, reason in done[-1].failed.items():
             raise UserError(f"{name} cannot be measured: {reason}")
     calmest = {name: min((one.timings[name] for one in done), key=lambda timing: timing.reference) for name in names}
-    return Baseline(machine.kind(), done[0].reference, {name: one.ratio for name, one in calmest.items()})
+    ratios = {name: one.ratio for name, one in calmest.items()}
+    return Baseline(machine.kind(), done[0].digest, code_digest(tree.code), ratios)

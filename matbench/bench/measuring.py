@@ -58,13 +58,13 @@ class Sitting:
     ----------
     failed
         Subject -> why it could not be measured.
-    reference
-        Digest of the reference workload.
+    digest
+        Of the reference workload and of what was timed.
     """
 
     timings: Mapping[str, Timing]
     failed: Mapping[str, str]
-    reference: str
+    digest: str
 
 
 @frozen
@@ -116,11 +116,11 @@ def environment(tree: Tree) -> dict[str, str]:
     return {**inherited, **threads, **kept, "NUMBA_CACHE_DIR": str(tree.kernels)}
 
 
-def _pytest(tree: Tree, tests: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    benchmarks = tests / BENCHMARKS
-    command = [str(tree.python), "-m", "pytest", "-c", str(tests / "pyproject.toml"), "-p", "no:cacheprovider", "-q"]
+def _pytest(tree: Tree, *arguments: str) -> subprocess.CompletedProcess[str]:
+    benchmarks = tree.code / BENCHMARKS
+    command = [str(tree.python), "-m", "pytest", "-c", str(tree.code / "pyproject.toml"), "-p", "no:cacheprovider"]
     return subprocess.run(  # noqa: S603 (this interpreter, no shell)
-        [*command, f"--confcutdir={benchmarks}", str(benchmarks / "test_speed.py"), *arguments],
+        [*command, "-q", f"--confcutdir={benchmarks}", str(benchmarks / "test_speed.py"), *arguments],
         cwd=tree.code,  # `python -m` looks there first
         env=environment(tree),
         capture_output=True,
@@ -148,13 +148,8 @@ def subjects(tree: Tree, patterns: Sequence[str] = ()) -> list[str]:
     return list(chosen) or names
 
 
-def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, tests: Path | None = None) -> Sitting:
+def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS) -> Sitting:
     """Time subjects in a fresh process.
-
-    Parameters
-    ----------
-    tests
-        The checkout whose tests/benchmarks do it; the tree's own by default.
 
     Raises
     ------
@@ -165,7 +160,6 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, tests: Path | No
         written = Path(place, "benchmarks.json")
         done = _pytest(
             tree,
-            tests or tree.code,
             f"--benchmark-min-rounds={-(-rounds // PARTS)}",
             f"--parts={PARTS}",
             f"--benchmark-json={written}",
@@ -184,7 +178,7 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, tests: Path | No
             parts.setdefault(one["params"]["name"], []).append(one)
     timings = {name: _timing(of_name) for name, of_name in parts.items()}
     missing = {name: "not measured" for name in names if name not in timings}
-    return Sitting(timings, {**missing, **measured["failed"]}, measured["reference"])
+    return Sitting(timings, {**missing, **measured["failed"]}, measured["digest"])
 
 
 def _timing(parts: Sequence[Any]) -> Timing:

@@ -64,7 +64,7 @@ def in_turns(
     with ExitStack() as stack:
 
         def side(name: str, tree: Tree) -> _Side:
-            said = stack.enter_context(tempfile.TemporaryFile("w+"))
+            said = stack.enter_context(tempfile.TemporaryFile("w+", errors="replace"))
             return stack.enter_context(_Side(name, tree, tests or here.code, core, said))
 
         one, other = side("working tree", here), side("base", base)
@@ -75,8 +75,8 @@ def in_turns(
 
 def _turns(here: "_Side", base: "_Side", name: str, rounds: int, number: int) -> Turns:
     try:
-        call = max(here.seconds(name, 0), base.seconds(name, 0))
-        calls = max(1, round(SLICE / max(call, 1e-6)))
+        call = max(here.seconds(name, 0), base.seconds(name, 0), 1e-6)
+        calls = max(1, round(SLICE / call))
         enough = max(FEWEST, round(ENOUGH / (calls * call)))
         ratios = []
         for turn in range(min(rounds, enough)):
@@ -129,7 +129,7 @@ class _Side:
         """Of so many calls; of one for 0, which makes the subject ready."""
         try:
             print(json.dumps([name, calls]), file=self._process.stdin, flush=True)
-        except BrokenPipeError:
+        except OSError:
             raise self._gone() from None
         answer = self._answer()
         if "failed" in answer:
@@ -147,4 +147,4 @@ class _Side:
         self._process.wait()
         self._said.seek(0)
         said = [line.strip() for line in self._said if line.strip()]
-        return _NotMeasured(f"not in the {self._name}: {said[-1] if said else f'status {self._process.returncode}'}")
+        return _NotMeasured(f"the {self._name} ended: {said[-1] if said else f'status {self._process.returncode}'}")

@@ -105,6 +105,8 @@ def _check(
 ) -> None:
     if sum((update, base is not None, scaling)) > 1:
         raise UserError("--update, --base and --scaling are three different things: give one of them")
+    if update and choice.only:
+        raise UserError(f"--update accepts all that is measured: leave out --only {choice.only[0]}")
     if out is not None and not scaling:
         raise UserError(f"--out {out} is for figures of growth: add --scaling")
     if out is not None and out.exists() and not out.is_dir():
@@ -180,7 +182,7 @@ class _Judging:
         return self.baselines or folder(self.tree)
 
     def update(self, work: bool, compile: bool) -> int:
-        """Store counters and ratios."""
+        """Store counters and ratios; always of all subjects, as the commit that stores them stands for all."""
         from matbench.bench import baselines, counting, tables
         from matbench.bench.compilation import compile_all
 
@@ -195,8 +197,7 @@ class _Judging:
         if compile:
             self.progress("compiling all methods without a cache")
             compilation = compile_all(self.tree).ratio
-        ratios = {**(kept.ratios if kept and self.choice.only else {}), **made.ratios}
-        stored = attrs.evolve(made, ratios=ratios, compilation=compilation)
+        stored = attrs.evolve(made, compilation=compilation)
         path = baselines.write(self._folder, stored)
         self.output.document |= {"stored": str(path), **attrs.asdict(stored)}
         self.output.say(f"stored: {path}")
@@ -232,18 +233,22 @@ class _Judging:
         kind = machine.kind()
         self.progress(f"timing {len(self.names)} subjects")
         first = sit(self.tree, self.names, self.choice.rounds)
-        stored, why = baselines.matching(baselines.read(self._folder), kind, first.reference)
+        stored, why = baselines.matching(self._folder, kind, first.digest)
 
         def again(suspects: Sequence[str]) -> Any:
             self.progress(f"again, in a fresh process: {', '.join(suspects)}")
             return sit(self.tree, suspects, self.choice.rounds)
 
-        def decide(suspects: Sequence[str]) -> Any:
-            with base.base_tree(self.tree, str(commit), self.progress) as other:
-                return base.compare(self.tree, other, suspects, base.PAIRS, self.choice.rounds, self.progress)
+        commit = base.last_change(self.tree.code, self._folder / machine.file_name(kind)) if stored else None
 
-        commit = base.accepted(self.tree.code, self._folder / machine.file_name(kind)) if stored else None
-        results = baselines.judge(self.names, stored, first, again, decide if commit else None, self.choice.margin)
+        def decide(suspects: Sequence[str]) -> Any:
+            try:
+                return self._in_turns(suspects, commit, stored)
+            except UserError as error:
+                self.output.say(f"not measured in turns: {error}")
+                return []
+
+        results = baselines.judge(self.names, stored, first, again, decide, self.choice.margin)
         self.output.document |= {
             "machine": kind,
             "judged": stored is not None,
@@ -261,6 +266,22 @@ class _Judging:
             self.output.say("nothing was measured")
         return REGRESSION if slower else DONE if results and not failed else FAILED
 
+    def _in_turns(self, suspects: Sequence[str], commit: str | None, stored: Any) -> Any:
+        """The working tree against the code whose ratios are stored."""
+        from matbench.bench import base
+        from matbench.bench.baselines import code_digest
+
+        if commit is None:
+            raise UserError("which commit stored the ratios is not known here; is the file committed, the clone whole?")
+        with base.base_tree(self.tree, commit, self.progress) as other:
+            if code_digest(other.code) != stored.code:
+                raise UserError(
+                    f"{commit[:8]} stored the ratios of other code than it holds; --update stores them anew"
+                )
+            return base.compare(
+                self.tree, other, suspects, self.choice.margin, base.PAIRS, self.choice.rounds, self.progress
+            )
+
     def _compilation(self) -> int:
         from statistics import median
 
@@ -269,7 +290,7 @@ class _Judging:
 
         self.progress("compiling all methods without a cache")
         found = compile_all(self.tree)
-        stored, _ = baselines.matching(baselines.read(self._folder), machine.kind(), found.digest)
+        stored, _ = baselines.matching(self._folder, machine.kind(), found.digest)
         budget = stored.compilation if stored else None
         ratios = [found.ratio]
         while budget is not None and ratios[0] > BUDGET * budget and len(ratios) < baselines.SITTINGS:
@@ -307,7 +328,7 @@ def _against(
 
     digest = commit(tree.code, name)
     with base_tree(tree, digest, progress) as other:
-        results = compare(tree, other, names, pairs, choice.rounds, progress)
+        results = compare(tree, other, names, choice.margin, pairs, choice.rounds, progress)
     verdicts = {one.name: one.verdict(choice.margin) for one in results}
     output.document |= {"base": digest, "times": [{**attrs.asdict(r), "verdict": verdicts[r.name]} for r in results]}
     output.table(tables.compared(results, choice.margin, f"{name} ({digest[:8]})"))

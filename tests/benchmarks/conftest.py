@@ -52,6 +52,6 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 def pytest_benchmark_update_json(config: Any, benchmarks: Any, output_json: dict[str, Any]) -> None:
     output_json["measured"] = {
         "code": str(Path(matbench.__file__).resolve().parents[1]),
-        "reference": digest(),
+        "digest": digest(),
         "failed": _failed,
     }

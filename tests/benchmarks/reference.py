@@ -1,7 +1,7 @@
 """The frozen reference workload: what every subject's time is divided by. It must never change.
 
-A stored ratio means something only while its divisor is the same, so the digest of this file stands
-in every stored baseline, and a baseline of another digest is not judged by.
+A stored ratio means something only while its divisor, and what is divided, are the same: so a digest of these
+files stands in every stored baseline, and a baseline of another digest is not judged by.
 """
 
 from hashlib import sha256
@@ -60,5 +60,6 @@ class Reference:
 
 
 def digest() -> str:
-    """SHA-256 of this file."""
-    return sha256(Path(__file__).read_bytes()).hexdigest()
+    """SHA-256 of this file and of what times which subjects."""
+    files = (Path(__file__).with_name(name) for name in ("reference.py", "paired.py", "subjects.py"))
+    return sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
