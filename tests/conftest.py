@@ -9,10 +9,16 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+from machines import Machines
 
+from matbench import contract
 from matbench.plugins import kernel_cache
+
+if TYPE_CHECKING:
+    from following import Desk
 
 # numba does not notice changes of what a kernel calls in another file: each state of the code has its own cache
 os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))
@@ -33,6 +39,37 @@ def data_root() -> Path:
     if not root.is_dir():
         pytest.fail(f"MATBENCH_DATA names {str(root)!r}, which is no folder")
     return root.resolve()
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Desk]":
+    """Where the commands that the documentation shows are run."""
+    from following import Desk
+
+    with pytest.MonkeyPatch.context() as patch:
+        yield Desk(tmp_path_factory.mktemp("desk"), patch)
+
+
+@pytest.fixture
+def machines(tmp_path: Path) -> Iterator[Machines]:
+    """A Dask cluster without any workers yet."""
+    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'matbench-stereo[cluster]'")
+    place = tmp_path / "elsewhere"
+    place.mkdir()
+    found = Machines(place)
+    yield found
+    found.close()
+
+
+@pytest.fixture(scope="module")
+def smaller() -> Iterator[dict[str, contract.Trial]]:
+    """What `check` tries, on scenes of two thirds the size."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("EASY", "EITHER_SIGN"):
+            patch.setattr(contract, name, getattr(contract, name).replace("]", " size=160x120]"))
+        contract.trials.cache_clear()
+        yield dict(contract.trials())
+    contract.trials.cache_clear()
 
 
 class Site:

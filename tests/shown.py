@@ -17,7 +17,8 @@ def blocks(language: str, page: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", TEXT[page], re.DOTALL)
 
 
-LINES = list(dict.fromkeys(line for text in TEXT.values() for line in re.findall(r"^    (matbench .*)$", text, re.M)))
+_COMMAND = re.compile(r"^    ((?:matbench|python \S+\.py) .*)$", re.M)
+LINES = list(dict.fromkeys(line for text in TEXT.values() for line in _COMMAND.findall(text)))
 """Every command that stands in a line of its own, once."""
 
 INLINE = sorted({" ".join(line.split()) for text in TEXT.values() for line in re.findall(r"`(matbench [^`]+)`", text)})

@@ -1,22 +1,20 @@
 """The same plan on a Dask cluster of several processes, one of which dies and one of which comes late."""
 
-import os
 import shutil
 import subprocess
 import sys
 import threading
-import time
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
 from attrs import evolve
+from machines import Machines, wait_until
 from scene_files import Layers, pfm_bytes, write_png
 
 from matbench import cluster, comparison, parcels, provenance, run
@@ -30,67 +28,10 @@ MATCHER = Path(__file__).with_name("programs") / "block_matcher.py"
 SMALL = "synthetic/box[size=96x72]"
 
 
-def wait_until(happens: Callable[[], object], seconds: float = 120) -> None:
-    end = time.monotonic() + seconds
-    while not happens():
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.05)
-
-
 def prepare(folder: Path, *algorithms: str, scene: str = SMALL, **settings: object) -> comparison.Comparison:
     return comparison.prepare(
         list(algorithms), scene, out=folder, plugin=[ROUGH, METHODS], settings=Settings(**settings)
     )
-
-
-class Machines:
-    """A scheduler and its workers, each a process as `dask scheduler` and `dask worker` start it."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.started: list[subprocess.Popen[bytes]] = []
-        file = folder / "scheduler.json"
-        self._start("scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(file))
-        wait_until(file.exists)
-        wait_until(lambda: file.stat().st_size)
-        time.sleep(0.2)
-        from distributed import Client
-
-        self.client: Any = Client(scheduler_file=str(file), set_as_default=False)
-        self.address = str(self.client.scheduler.address)
-
-    def _start(self, what: str, *options: str) -> None:
-        line = [sys.executable, "-m", f"distributed.cli.dask_{what}", *options]
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": self.folder}
-        self.started.append(subprocess.Popen(line, start_new_session=True, **quiet))  # type: ignore[call-overload]
-
-    def add(self, *options: str) -> None:
-        self._start("worker", self.address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "60", *options)
-
-    def pids(self) -> dict[str, int]:
-        """The processes of the workers by their addresses."""
-        found: dict[str, int] = self.client.run(os.getpid)
-        return found
-
-    def close(self) -> None:
-        every = [p for one in self.started for p in [psutil.Process(one.pid), *psutil.Process(one.pid).children(True)]]
-        self.client.close()
-        for one in reversed(self.started):
-            one.terminate()
-        _, left = psutil.wait_procs(every, timeout=90)  # a worker itself waits 30 s for its threads
-        for one in left:
-            one.kill()
-        assert not left, "nothing outlives the cluster"
-
-
-@pytest.fixture
-def machines(tmp_path: Path) -> Iterator[Machines]:
-    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'matbench-stereo[cluster]'")
-    place = tmp_path / "elsewhere"
-    place.mkdir()
-    found = Machines(place)
-    yield found
-    found.close()
 
 
 @contextmanager

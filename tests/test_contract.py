@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -76,17 +75,6 @@ def test_in_a_mirror_exact_truth_still_explains_all_views(name: str) -> None:
     assert twice.labels == scene.labels
     assert np.array_equal(twice.truth[1], scene.truth[1])
     assert np.array_equal(twice.visible[0], scene.visible[0])
-
-
-@pytest.fixture(scope="module")
-def smaller() -> Iterator[dict[str, contract.Trial]]:
-    """The trials on scenes of two thirds the size, as all solves share one process here."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("EASY", "EITHER_SIGN"):
-            patch.setattr(contract, name, getattr(contract, name).replace("]", " size=160x120]"))
-        contract.trials.cache_clear()
-        yield dict(contract.trials())
-    contract.trials.cache_clear()
 
 
 @pytest.mark.parametrize("selector", BUILT_IN)

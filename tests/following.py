@@ -1,0 +1,168 @@
+"""Following the README and the documentation: every command that they show is run, on small things.
+
+A line is run as it stands but for these rules:
+
+- pictures are 64x48 pixels: synthetic scenes are computed so, `DIR` holds the middle of the real pictures of four
+  scenes, and `--row 144` is row 24. Of `synthetic/*` only `synthetic/box` is taken;
+- where no method is named `sgbm` is taken, not all of them, and where no scene is `synthetic/box`;
+- cells share a process (`--isolation shared`) where nothing is said of how they run; `--jobs 4` are 2;
+- of all pages of reports that a file of tests asks for only the first is drawn; all tables are written;
+- `tcp://head:8786` is a scheduler on this machine, with a worker, in processes of their own;
+- `check` tries its methods on scenes of two thirds the size;
+- `bench` and `prove.py` run in a copy of the checkout that has one method and one kernel, with fewer rounds and tries;
+- `fetch` needs the network: it tells what it would do (`--dry-run`);
+- `view` opens a window: the recording that it would show is looked for.
+"""
+
+import csv
+import re
+import shlex
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scene_files import Layers, write_png
+from shown import LINES, METHOD, ROOT
+
+from matbench.cli import main
+from matbench.comparison import Comparison
+from matbench.spec import Spec, parse
+
+WIDTH, HEIGHT = 64, 48
+RUNS = ("compare", "ablate")
+STAGES = ("report", "figure", "status", "export", "score", "view")
+"""What needs a run, in this order where a page shows it after its run; all other commands come before."""
+PROVE = "tests/benchmarks/prove.py"
+
+
+def command(line: str) -> str:
+    return shlex.split(line)[1]
+
+
+def words(line: str) -> list[str]:
+    """What stands after `matbench`, or after a program of the tests."""
+    start = shlex.split(line).index(PROVE if PROVE in line else "matbench") + 1
+    return shlex.split(line)[start:]
+
+
+GROUPS: Mapping[str, Callable[[str], bool]] = {
+    "plain": lambda line: (
+        command(line) in ("list", "scene", *STAGES)
+        or (command(line) in RUNS and "--data " not in line and "--dask " not in line)
+    ),
+    "real": lambda line: command(line) in RUNS and "--data " in line,
+    "dask": lambda line: command(line) in RUNS and "--dask " in line,
+    "fetch": lambda line: command(line) == "fetch",
+    "check": lambda line: command(line) == "check",
+    "bench": lambda line: command(line) == "bench",
+    "prove": lambda line: command(line) == PROVE,
+}
+"""The lines that are run in the same way: each belongs to one group."""
+
+
+def lines(group: str) -> list[str]:
+    return [line for line in LINES if GROUPS[group](line)]
+
+
+def stage(line: str) -> int:
+    return STAGES.index(command(line)) if command(line) in STAGES else -1
+
+
+def shortened(line: str, **places: str) -> list[str]:
+    """The words of a line by the rules above.
+
+    Parameters
+    ----------
+    places
+        What stands for words such as `DIR`.
+    """
+    tokens, out = words(line), []
+    for before, token in pairwise(["", *tokens]):
+        if before in ("--row", "--rows"):
+            out.append(",".join(str(int(row) // 6) for row in token.split(",")))
+        elif before == "-s" or token.startswith("synthetic/"):
+            out += _small(token)
+        elif before == "--jobs":
+            out.append("2")
+        else:
+            out.append(places.get(token, token))
+    if tokens[0] == "compare":
+        out += [] if "-a" in tokens else ["-a", "sgbm"]
+        out += [] if "-s" in tokens else ["-s", *_small("synthetic/box")]
+    if tokens[0] in RUNS and not {"--jobs", "--dask"} & set(tokens):
+        out += ["--isolation", "shared"]
+    return [*out, "--dry-run"] if tokens[0] == "fetch" else out
+
+
+def _small(selector: str) -> list[str]:
+    """The same scenes in small pictures."""
+    found = [Spec("synthetic/box" if s.name == "synthetic/*" else s.name, s.options) for s in parse(selector)]
+    size = {"size": f"{WIDTH}x{HEIGHT}"}
+    return [str(Spec(s.name, {**s.options, **size}) if s.name.startswith("synthetic/") else s) for s in found]
+
+
+class Desk:
+    """Where somebody follows the documentation, line by line, with what it has people write themselves.
+
+    Attributes
+    ----------
+    runs
+        Folders of the runs that were scored, in order. The first one's page is drawn.
+    """
+
+    def __init__(self, folder: Path, patch: pytest.MonkeyPatch) -> None:
+        self.folder, self.runs = folder, list[Path]()
+        _own_scene(folder / "my_scene")
+        (folder / "mine.py").write_text(METHOD)
+        _own_program(folder / "mine")
+        (folder / "algorithms").symlink_to(ROOT / "algorithms")
+        draw = Comparison.report
+
+        def report(ready: Comparison, *given: Any) -> Path:
+            self.runs.append(ready.folder)
+            return draw(ready, *given) if len(self.runs) == 1 else ready.folder / "report.html"
+
+        patch.setattr(Comparison, "report", report)
+        patch.chdir(folder)
+        patch.delenv("MATBENCH_DATA", raising=False)
+
+    def follow(self, tokens: list[str]) -> str:
+        """Run a command, which must end well and write what it says; what it printed."""
+        scored, out, err = len(self.runs), StringIO(), StringIO()
+        with pytest.raises(SystemExit) as done, redirect_stdout(out), redirect_stderr(err):
+            main(tokens)
+        assert not done.value.code, f"{shlex.join(tokens)}\n{out.getvalue()[-2000:]}{err.getvalue()}"
+        for path in re.findall(r"^(?:scores|curves|ablation): (.*)$", out.getvalue(), re.M):
+            assert Path(path).stat().st_size > 100, f"{shlex.join(tokens)}: {path}"
+        if tokens[0] in RUNS and "--dry-run" not in tokens:
+            (run,) = self.runs[scored:]
+            assert scores(run), shlex.join(tokens)
+        return out.getvalue()
+
+
+def scores(run: Path) -> list[dict[str, str]]:
+    with (run / "results.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _own_scene(folder: Path) -> None:
+    """The folder that the guide's scene.toml describes."""
+    folder.mkdir()
+    world = Layers(near=6, far=2)
+    for view, name in enumerate(("left", "middle", "right")):
+        write_png(folder / f"{name}.png", world.view(view - 1))
+    write_png(folder / "middle_disparity.png", (world.truth() * 16).astype(np.uint8))
+
+
+def _own_program(path: Path) -> None:
+    """A program that is called as the guide says, and may be told to hurry."""
+    matcher = (ROOT / "tests/programs/block_matcher.py").read_text()
+    hurry = 'sys.argv = [word for word in sys.argv if word != "--fast"]\n'
+    path.write_text(f"#!{sys.executable}\nimport sys\n{hurry}{matcher}")
+    path.chmod(0o755)

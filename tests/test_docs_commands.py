@@ -1,0 +1,36 @@
+"""The commands that the documentation shows for built-in scenes and scenes of one's own are run, one after another."""
+
+from pathlib import Path
+
+import pytest
+from following import Desk, lines, scores, shortened, stage
+from machines import Machines, wait_until
+from shown import SCENE
+
+from matbench import recording
+
+
+def test_commands_run_one_after_another(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[bool] = []
+    monkeypatch.setattr(recording, "view", lambda path, web: seen.append(path.is_file()))
+    for line in sorted(lines("plain"), key=stage):
+        desk.follow(shortened(line))
+        if " scene new " in line:
+            (desk.folder / "my_scene" / "scene.toml").write_text(SCENE)
+    assert len(seen) == sum(" view " in line for line in lines("plain"))
+    assert all(seen)
+    assert (desk.runs[0] / "report.html").is_file()
+    assert b"\\toprule" in Path("table.tex").read_bytes()
+    assert scores(Path("runs/both"))
+
+
+@pytest.mark.parametrize("line", lines("dask"))
+def test_commands_run_on_a_cluster(line: str, desk: Desk, machines: Machines) -> None:
+    machines.add()
+    wait_until(machines.pids)
+    desk.follow(shortened(line, **{"tcp://head:8786": machines.address}))
+
+
+@pytest.mark.parametrize("line", lines("fetch"))
+def test_downloads_are_ready_to_begin(line: str, desk: Desk, tmp_path: Path) -> None:
+    assert "middlebury" in desk.follow(shortened(line, DIR=str(tmp_path)))
