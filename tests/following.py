@@ -142,12 +142,13 @@ class Desk:
             assert Path(path).stat().st_size > 100, f"{shlex.join(tokens)}: {path}"
         if tokens[0] in RUNS and "--dry-run" not in tokens:
             (run,) = self.runs[scored:]
-            assert scores(run), shlex.join(tokens)
+            assert table(run / "results.csv"), shlex.join(tokens)
         return out.getvalue()
 
 
-def scores(run: Path) -> list[dict[str, str]]:
-    with (run / "results.csv").open(newline="") as file:
+def table(path: Path) -> list[dict[str, str]]:
+    """The rows of a CSV file, by the names of its columns."""
+    with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
 

@@ -14,7 +14,7 @@ from shown import INLINE, LINES, PAGES, ROOT, TEXT
 from matbench.cli import app
 
 
-@pytest.mark.parametrize("line", LINES)
+@pytest.mark.parametrize("line", LINES, ids=str)
 def test_commands_are_run_in_one_way(line: str) -> None:
     """See `following`; a line that belongs nowhere would not be run."""
     assert [name for name, has in GROUPS.items() if has(line)] in [[name] for name in GROUPS]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import cv2
 import pytest
-from following import HEIGHT, WIDTH, Desk, lines, scores, shortened
+from following import HEIGHT, WIDTH, Desk, lines, shortened, table
 
 SCENES = (
     "middlebury/scenes2001/data/tsukuba",
@@ -31,10 +31,10 @@ def middles(data_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-@pytest.mark.parametrize("line", lines("real"))
+@pytest.mark.parametrize("line", lines("real"), ids=str)
 def test_commands_on_real_scenes_run(line: str, desk: Desk, middles: Path) -> None:
     said = desk.follow(shortened(line, DIR=str(middles)))
     if "ablate" in line:
-        scenes = {row["scene"].partition("[")[0] for row in scores(desk.runs[-1])}
+        scenes = {row["scene"].partition("[")[0] for row in table(desk.runs[-1] / "results.csv")}
         assert len(scenes) > 1
         assert "curves: " in said or "ablation: " in said
