@@ -11,7 +11,8 @@ A line is run as it stands but for these rules:
 - `check` tries its methods on scenes of two thirds the size;
 - `bench` and `prove.py` run in a copy of the checkout that has one method and one kernel, with fewer rounds and tries;
 - `fetch` needs the network: it tells what it would do (`--dry-run`);
-- `view` opens a window: the recording that it would show is looked for.
+- `view` opens a window: the recording that it would show is looked for;
+- installing needs the network, too: `.ci/run` does it before it runs the tests.
 """
 
 import csv
@@ -27,7 +28,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scene_files import Layers, write_png
+from scene_files import Layers, write_pair, write_png
 from shown import LINES, METHOD, ROOT
 
 from matbench.cli import main
@@ -42,16 +43,17 @@ PROVE = "tests/benchmarks/prove.py"
 
 
 def command(line: str) -> str:
-    return shlex.split(line)[1]
+    return " ".join(shlex.split(line)[1:2])
 
 
 def words(line: str) -> list[str]:
-    """What stands after `matbench`, or after a program of the tests."""
-    start = shlex.split(line).index(PROVE if PROVE in line else "matbench") + 1
-    return shlex.split(line)[start:]
+    """What stands after `matbench`, or after the program that proves."""
+    tokens = shlex.split(line)
+    return tokens[2:] if command(line) == PROVE else tokens[1:]
 
 
 GROUPS: Mapping[str, Callable[[str], bool]] = {
+    "install": lambda line: "pip install " in line,
     "plain": lambda line: (
         command(line) in ("list", "scene", *STAGES)
         or (command(line) in RUNS and "--data " not in line and "--dask " not in line)
@@ -62,6 +64,7 @@ GROUPS: Mapping[str, Callable[[str], bool]] = {
     "check": lambda line: command(line) == "check",
     "bench": lambda line: command(line) == "bench",
     "prove": lambda line: command(line) == PROVE,
+    "help": lambda line: words(line) == ["COMMAND", "--help"],
 }
 """The lines that are run in the same way: each belongs to one group."""
 
@@ -119,6 +122,7 @@ class Desk:
     def __init__(self, folder: Path, patch: pytest.MonkeyPatch) -> None:
         self.folder, self.runs = folder, list[Path]()
         _own_scene(folder / "my_scene")
+        write_pair(folder / "path/to/Adirondack-perfect", Layers(near=9.5, far=3.25))
         (folder / "mine.py").write_text(METHOD)
         _own_program(folder / "mine")
         (folder / "algorithms").symlink_to(ROOT / "algorithms")
@@ -143,6 +147,7 @@ class Desk:
         if tokens[0] in RUNS and "--dry-run" not in tokens:
             (run,) = self.runs[scored:]
             assert table(run / "results.csv"), shlex.join(tokens)
+            assert {row["status"] for row in table(run / "cells.csv")} == {"ok"}, shlex.join(tokens)
         return out.getvalue()
 
 

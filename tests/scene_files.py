@@ -7,6 +7,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+CALIB = """cam0=[3979.911 0 1244.772; 0 3979.911 1019.507; 0 0 1]
+cam1=[3979.911 0 1369.115; 0 3979.911 1019.507; 0 0 1]
+doffs=124.343
+baseline=193.001
+width=96
+height=80
+ndisp=24
+isint=0
+vmin=3
+vmax=10
+dyavg=0.918
+dymax=1.516
+"""
+"""Of a pair in Middlebury's layout since 2014."""
+
 
 def write_png(path: Path, image: NDArray[np.integer]) -> None:
     """(H, W) or (H, W, 3) RGB of 8 or 16 bits."""
@@ -53,6 +68,17 @@ class Layers:
 
     def truth(self, across: float = 0.0, down: float = 0.0) -> NDArray[np.float32]:
         return np.where(self._on_board(across, down), self.near, self.far).astype(np.float32)
+
+
+def write_pair(folder: Path, world: Layers) -> None:
+    """A pair in Middlebury's layout since 2014; the truth of two rows is unknown."""
+    folder.mkdir(parents=True)
+    for view in (0, 1):
+        write_png(folder / f"im{view}.png", world.view(view))
+        truth = world.truth(view)
+        truth[:2] = np.inf
+        (folder / f"disp{view}.pfm").write_bytes(pfm_bytes(truth))
+    (folder / "calib.txt").write_text(CALIB)
 
 
 def check_one_line(error: Exception) -> None:

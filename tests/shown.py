@@ -17,12 +17,15 @@ def blocks(language: str, page: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", TEXT[page], re.DOTALL)
 
 
-_COMMAND = re.compile(r"^    ((?:matbench|python \S+\.py) .*)$", re.M)
-LINES = list(dict.fromkeys(line for text in TEXT.values() for line in _COMMAND.findall(text)))
-"""Every command that stands in a line of its own, once."""
-
-INLINE = sorted({" ".join(line.split()) for text in TEXT.values() for line in re.findall(r"`(matbench [^`]+)`", text)})
-"""Every command within a sentence."""
+_ALONE = re.compile(r"^    ((?:.* && )?(?:matbench|pip|python3?)(?: .*)?)$", re.M)
+_WITHIN = re.compile(r"`(matbench [^`]+)`")
+LINES = list(
+    dict.fromkeys(
+        [line for text in TEXT.values() for line in _ALONE.findall(text)]
+        + [" ".join(line.split()) for text in TEXT.values() for line in _WITHIN.findall(text)]
+    )
+)
+"""Every command, once: those in a line of their own, then those within sentences."""
 
 METHOD = blocks("python", "README.md")[0]
 SCENE = blocks("toml", "docs/guides/own-scene.md")[0]

@@ -8,6 +8,7 @@ from machines import Machines, wait_until
 from shown import SCENE
 
 from matbench import recording
+from matbench.cli import app
 
 HEAD = "tcp://head:8786"
 
@@ -16,7 +17,7 @@ def test_commands_run_one_after_another(desk: Desk, monkeypatch: pytest.MonkeyPa
     seen: list[bool] = []
     monkeypatch.setattr(recording, "view", lambda path, web: seen.append(path.is_file()))
     for line in sorted(lines("plain"), key=stage):
-        desk.follow(shortened(line))
+        desk.follow(shortened(line, RUN="runs/mine"))
         if " scene new " in line:
             (desk.folder / "my_scene" / "scene.toml").write_text(SCENE)
     assert len(seen) == sum(" view " in line for line in lines("plain"))
@@ -42,3 +43,9 @@ def test_commands_run_on_a_cluster(line: str, desk: Desk, request: pytest.Fixtur
 @pytest.mark.parametrize("line", lines("fetch"), ids=str)
 def test_downloads_are_ready_to_begin(line: str, desk: Desk, tmp_path: Path) -> None:
     assert "middlebury" in desk.follow(shortened(line, DIR=str(tmp_path)))
+
+
+@pytest.mark.parametrize("line", lines("help"), ids=str)
+def test_commands_explain_themselves(line: str, desk: Desk) -> None:
+    for name in (name for name in app if not name.startswith("-")):
+        assert f"matbench {name}" in desk.follow(shortened(line, COMMAND=name))

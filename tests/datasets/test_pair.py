@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scene_files import Layers, check_one_line, pfm_bytes, write_png
+from scene_files import CALIB, Layers, check_one_line, write_pair
 
 from matbench import load_scene
 from matbench.consistency import together, warping_errors
@@ -15,31 +15,12 @@ from matbench.errors import UserError
 from matbench.scene import Range
 
 WORLD = Layers(near=9.5, far=3.25)
-CALIB = """cam0=[3979.911 0 1244.772; 0 3979.911 1019.507; 0 0 1]
-cam1=[3979.911 0 1369.115; 0 3979.911 1019.507; 0 0 1]
-doffs=124.343
-baseline=193.001
-width=96
-height=80
-ndisp=24
-isint=0
-vmin=3
-vmax=10
-dyavg=0.918
-dymax=1.516
-"""
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     folder = tmp_path / "Adirondack-imperfect"
-    folder.mkdir()
-    for view in (0, 1):
-        write_png(folder / f"im{view}.png", WORLD.view(view))
-        truth = WORLD.truth(view)
-        truth[:2] = np.inf
-        (folder / f"disp{view}.pfm").write_bytes(pfm_bytes(truth))
-    (folder / "calib.txt").write_text(CALIB)
+    write_pair(folder, WORLD)
     return folder
 
 
