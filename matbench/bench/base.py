@@ -8,7 +8,7 @@ import tempfile
 import tomllib
 import venv
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,6 +18,7 @@ from attrs import frozen
 from matbench.bench.measuring import ROUNDS, Progress, Tree
 from matbench.bench.turns import Turns, in_turns
 from matbench.errors import UserError
+from matbench.plugins import kernel_cache
 from matbench.statistics import CONFIDENCE
 
 PAIRS = 4
@@ -116,12 +117,19 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
 
     Where it declares the same dependencies as the working tree, its environment shares the libraries
     that are installed here: the same versions, and no network is needed. Else they are installed.
+    What is compiled of its kernels stays, for the next time.
     """
+    kept = kernel_cache().parent / digest
     try:
-        with tempfile.TemporaryDirectory(prefix="matbench-base-") as place:
-            code = Path(place, "code")
+        with ExitStack() as stack:
+            place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="matbench-base-")))
+            code = stack.enter_context(_folder_alone(kept / "code", place / "code"))
             _git(here.code, "worktree", "add", "--detach", "--quiet", str(code), digest)
-            environment = Path(place, "venv")
+            for file in code.rglob("*.py"):
+                os.utime(
+                    file, (0, 0)
+                )  # numba takes a kernel as compiled if its file's path, time and size are the same
+            environment = place / "venv"
             if _needs(code) == _needs(here.code):
                 progress(f"base {digest[:8]}: the libraries that are installed here")
                 venv.create(environment, symlinks=True)
@@ -132,10 +140,26 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
                 venv.create(environment, symlinks=True, with_pip=True)
                 python = _python(environment)
                 _run(python, "-m", "pip", "install", "--quiet", "--editable", f"{code}[test]")
-            yield Tree(code, python, Path(place, "kernels"))
+            yield Tree(code, python, kept / "kernels")
     finally:
         with suppress(UserError):
             _git(here.code, "worktree", "prune")
+
+
+@contextmanager
+def _folder_alone(wanted: Path, else_this: Path) -> Iterator[Path]:
+    """A new folder that goes when it ends; the other one where another process has the wanted one."""
+    wanted.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        wanted.mkdir()
+    except FileExistsError:
+        else_this.mkdir()
+        yield else_this
+        return
+    try:
+        yield wanted
+    finally:
+        shutil.rmtree(wanted, ignore_errors=True)
 
 
 def _python(environment: Path) -> Path:

@@ -18,6 +18,9 @@ from matbench.errors import UserError
 MARGIN = 0.15
 """How much more time than the stored code a subject may take, as a share of it."""
 
+SUSPECT = 0.1
+"""How far a ratio must lie above the stored one, as a share of it, for a closer look; less with a margin below it."""
+
 SITTINGS = 3
 """Fresh processes that decide together where the commit that stored a ratio is not at hand: their median does."""
 
@@ -174,7 +177,7 @@ def judge(
     """Compare a sitting with the stored ratios, and look closer at what seems slow.
 
     What other machines' work does to this one moves ratios for minutes, by up to 40 per cent. So a ratio
-    beyond half of the margin raises a suspicion only. It is decided by measuring both codes in turns; where
+    beyond `SUSPECT` raises a suspicion only. It is decided by measuring both codes in turns; where
     the other is not at hand, or has no such subject, by `SITTINGS` processes whose median must lie beyond it.
 
     Parameters
@@ -186,7 +189,7 @@ def judge(
     """
     old = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
     ratios = {name: [timing.ratio] for name, timing in first.timings.items()}
-    suspects = [name for name in old if name in ratios and ratios[name][0] > old[name] * (1 + margin / 2)]
+    suspects = [name for name in old if name in ratios and ratios[name][0] > old[name] * (1 + min(SUSPECT, margin))]
     failed = {name: "not measured" for name in names if name not in ratios} | dict(first.failed)
     decided = decide(suspects) if suspects else ()
     against = {one.name: one for one in decided if not one.reason}

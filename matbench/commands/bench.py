@@ -142,13 +142,20 @@ class _Output:
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[str], None]]:
-        """Tell on the terminal, beside the output, what is going on."""
+        """Tell on the terminal, beside the output, what is going on; elsewhere, a line for each step of it."""
         beside = Console(stderr=True)
         if beside.is_terminal:
             with beside.status("starting") as status:
                 yield status.update
         else:
-            yield lambda line: print(f"bench: {line}", file=sys.stderr)
+            said = [""]
+
+            def tell(line: str) -> None:
+                if (step := line.partition(":")[0]) != said[-1]:
+                    said.append(step)
+                    print(f"bench: {line}", file=sys.stderr)
+
+            yield tell
 
     def close(self) -> None:
         if self._choice.as_json:
