@@ -144,7 +144,7 @@ class Desk:
         assert not done.value.code, f"{shlex.join(tokens)}\n{out.getvalue()[-2000:]}{err.getvalue()}"
         for path in re.findall(r"^(?:scores|curves|ablation): (.*)$", out.getvalue(), re.M):
             assert Path(path).stat().st_size > 100, f"{shlex.join(tokens)}: {path}"
-        if tokens[0] in RUNS and "--dry-run" not in tokens:
+        if tokens[0] in RUNS and not {"--dry-run", "--help"} & set(tokens):
             (run,) = self.runs[scored:]
             assert table(run / "results.csv"), shlex.join(tokens)
             assert {row["status"] for row in table(run / "cells.csv")} == {"ok"}, shlex.join(tokens)
