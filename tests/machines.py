@@ -57,4 +57,4 @@ class Machines:
         _, left = psutil.wait_procs(every, timeout=90)  # a worker itself waits 30 s for its threads
         for process in left:
             process.kill()
-        assert not left, "nothing outlives the cluster"
+        assert not left, f"nothing outlives the cluster: {left}"

@@ -64,9 +64,9 @@ def run(code: Path, *tokens: str) -> str:
     return done.stdout
 
 
-def stores(line: str) -> bool:
+def stores(line: object) -> bool:
     """What is stored is judged from then on, and this machine may be busy: such a line comes last."""
-    return "--update" in line
+    return "--update" in str(line)
 
 
 @pytest.mark.parametrize("line", sorted(lines("bench"), key=stores), ids=str)
