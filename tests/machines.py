@@ -49,12 +49,15 @@ class Machines:
         return found
 
     def close(self) -> None:
-        ours = [psutil.Process(one.pid) for one in self.started]
-        every = [each for one in ours for each in (one, *one.children(recursive=True))]
+        """End the workers, then their scheduler: a worker that loses it while it ends may wait for it forever."""
+        scheduler, *workers = [psutil.Process(one.pid) for one in self.started]
+        every = [each for one in (scheduler, *workers) for each in (one, *one.children(recursive=True))]
         self.client.close()
-        for one in reversed(self.started):
+        for one in workers:
             one.terminate()
-        _, left = psutil.wait_procs(every, timeout=90)  # a worker itself waits 30 s for its threads
+        psutil.wait_procs(workers, timeout=60)  # a worker itself waits 30 s for its threads
+        scheduler.terminate()
+        _, left = psutil.wait_procs(every, timeout=60)
         for process in left:
             process.kill()
         assert not left, f"nothing outlives the cluster: {left}"
