@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from matbench.bench.baselines import Baseline, Judged
 from matbench.bench.measuring import Sitting, Timing, Tree
 from matbench.bench.roofline import Roofline
 from matbench.bench.turns import Turns, in_turns
-from matbench.cli import main
+from matbench.cli import Console, main
 from matbench.errors import UserError
 
 KIND = {"processor": "Some(R) Processor 6/1/2", "cores": "2", "numba": "0.68"}
@@ -120,7 +121,18 @@ def test_what_could_not_be_measured_failed_and_what_is_not_stored_is_new() -> No
     first = evolve(sitting(three=3.0), failed={"one": "ValueError: no"})
     one, three = baselines.judge(["one", "three"], STORED, first, *[lambda _: pytest.fail("nobody is suspect")] * 2)
     assert (one.verdict, one.reason, three.verdict) == ("failed", "ValueError: no", "new")
-    assert "ValueError: no" in tables.judged([one, three]).markdown()
+    assert "one failed: ValueError: no" in tables.judged([one, three]).markdown()
+
+
+def test_tables_fit_eighty_columns() -> None:
+    against = base.versus("long", [Turns(1.285), Turns(1.3)])
+    longest = "materiality[preset=descent]"
+    timing = Timing(1215.3, 1000, 1215.3, 0.0375, 1e-4, "method", 25)
+    one = Judged(longest, "slower", timing, (1215.3,), 1090.0, against)
+    for table in (tables.judged([one]), tables.compared([evolve(against, name=longest)], 0.15, "origin/main")):
+        out = StringIO()
+        Console(file=out, width=80).print(table.rich())
+        assert all(cell in out.getvalue() for row in table.rows for cell in row)
 
 
 def test_ratios_are_stored_for_a_kind_of_machine(tmp_path: Path) -> None:

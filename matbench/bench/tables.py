@@ -16,17 +16,18 @@ from matbench.bench.measuring import Timing
 
 @frozen
 class Table:
-    """Rows of words under heads; the first `words` columns are words, the others numbers."""
+    """Rows of words under heads; the first `words` columns are words, the others numbers. Notes come below."""
 
     title: str
     heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     words: int = 1
+    notes: tuple[str, ...] = ()
 
     def rich(self) -> RichTable:
         """For the terminal."""
         table = RichTable(title=Text(self.title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
-        table.pad_edge = False
+        table.padding, table.pad_edge, table.show_edge = (0, 1, 0, 0), False, False
         for number, head in enumerate(self.heads):
             table.add_column(head, justify="left" if number < self.words else "right", no_wrap=number == 0)
         for row in self.rows:
@@ -38,7 +39,7 @@ class Table:
         sides = ["---"] * self.words + ["--:"] * (len(self.heads) - self.words)
         lines = [self.heads, sides, *self.rows]
         escaped = ("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
-        return f"**{self.title}**\n\n" + "\n".join(escaped) + "\n"
+        return f"**{self.title}**\n\n" + "\n".join(escaped) + "\n" + "".join(f"\n{note}\n" for note in self.notes)
 
 
 def seconds(value: float) -> str:
@@ -64,17 +65,17 @@ def judged(results: Sequence[Judged]) -> Table:
         (
             one.name,
             one.verdict,
-            seconds(one.timing.seconds) if one.timing else one.reason,
+            seconds(one.timing.seconds) if one.timing else "",
             _number(one.ratio, ".4g"),
             _reach(one.timing),
-            _number(one.stored, ".4g"),
             _number(one.ratio / one.stored - 1, "+.1%"),
             _number(one.against.ratio - 1, "+.1%") if one.against else "",
         )
         for one in results
     )
-    heads = "subject", "verdict", "time", "refs", "+-", "stored", "by refs", "in turns"
-    return Table("Processor time, and how many references that is", heads, rows, 2)
+    heads = "subject", "verdict", "time", "refs", "+-", "change", "in turns"
+    notes = tuple(f"{one.name} failed: {one.reason}" for one in results if one.reason)
+    return Table("Processor time, in references (refs), against what is stored", heads, rows, 2, notes)
 
 
 def compared(results: Sequence[Versus], margin: float, base: str) -> Table:
@@ -83,13 +84,14 @@ def compared(results: Sequence[Versus], margin: float, base: str) -> Table:
         (
             one.name,
             one.verdict(margin),
-            one.reason or _number(one.ratio),
+            _number(one.ratio),
             "" if isnan(one.low) else f"{one.low:.3f} .. {one.high:.3f}",
         )
         for one in results
     )
     heads = "subject", "verdict", "time, here / base", "95 % interval"
-    return Table(f"Working tree against {base}", heads, rows, 2)
+    notes = tuple(f"{one.name} not compared: {one.reason}" for one in results if one.reason)
+    return Table(f"Working tree against {base}", heads, rows, 2, notes)
 
 
 def compiled(found: Compilation, stored: float | None, ratio: float) -> Table:

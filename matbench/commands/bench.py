@@ -134,6 +134,8 @@ class _Output:
             print(table.markdown())
         elif not self._choice.as_json:
             self._console.print(table.rich())
+            for note in (*table.notes, ""):
+                self._console.say(note)
 
     def say(self, line: str) -> None:
         if not self._choice.as_json:
