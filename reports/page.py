@@ -62,7 +62,7 @@ def render(report: Report) -> str:
         style=(template / "report.css").read_text(encoding="utf-8"),
         script=script,
         script_hash=b64encode(sha256(script.encode()).digest()).decode("ascii"),
-        answer=_answer(rows, scope),
+        answer=_answer(rows, scope, numbers),
         counts=report.cells["status"].value_counts().to_dict(),
         table=_table(numbers, rows),
         costs={name: COSTS[name] for name in numbers.costs},
@@ -115,17 +115,20 @@ def _hex(name: str) -> str:
     return coloring.palette(name).tobytes().hex()
 
 
-def _answer(rows: pd.DataFrame, scope: Shared) -> dict[str, Any]:
+def _answer(rows: pd.DataFrame, scope: Shared, numbers: Numbers) -> dict[str, Any]:
     """What the first sentence says: who is best by total_bad_1 in `all`, and how far that goes."""
     scores = rows.loc[rows["ranked"], f"{METRIC} {REGION}"].dropna()
     shown = {str(m): tables.text(v, "%") for m, v in scores.items()}
     best = [m for m in shown if shown[m] == next(iter(shown.values()))]
     rest = [m for m in shown if m not in best]
+    lines = numbers.against(METRIC, REGION, best[0]) if rest else []
+    verdicts = {line["method"]: line["verdict"] for line in lines}
     return {
         "best": best,
         "score": shown[best[0]] if best else "",
         "next": rest[0] if rest else None,
         "next_score": shown[rest[0]] if rest else "",
+        "undecided": bool(rest) and verdicts.get(rest[0]) == "undecided",
         "compared": len(shown),
         "scenes": len(scope.scenes),
         "distinct": scope.distinct,

@@ -3,6 +3,7 @@
 import json
 import re
 import time
+from collections.abc import Sequence
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
@@ -94,6 +95,23 @@ def test_the_answer_is_honest(report: Report) -> None:
     words = " ".join(re.sub(r"<[^>]+>", "", unescape(html)).split())
     assert "good has the lowest total_bad_1 in all on 2 scenes: 10.51" in words
     assert "too few scenes to conclude" in html
+
+
+@pytest.mark.parametrize(("gaps", "decided"), [((3, -2.5, 3, -2, 3, -2), False), ((3, 1, 2, 1, 2, 3), True)])
+def test_a_lead_that_scenes_do_not_decide_is_told_with_the_winner(
+    report: Report, gaps: Sequence[float], decided: bool
+) -> None:
+    made = [
+        ("sgbm", "", f"made/{number}", "b", 0, "all", "total_bad_1", 9.0 + gap * place, "%", 100)
+        for number, gap in enumerate(gaps)
+        for place in (0, 1)
+    ]
+    results = pd.DataFrame(made, columns=report.results.columns)
+    results.loc[1::2, "algorithm"] = "other"
+    cells = results[["algorithm", "params", "scene", "seed"]].assign(status="ok", seconds=1.0, peak_mb=1.0, reason="")
+    html = page.render(evolve(report, results=results, cells=cells, maps={}, scenes={}))
+    assert "ahead of <b>other</b>" in html
+    assert ("do not decide" not in html) == decided
 
 
 @pytest.mark.parametrize("keep_cells", [True, False])
