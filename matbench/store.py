@@ -340,7 +340,7 @@ class Store:
         exact = [name for name in hits if name == part]
         if len(exact or hits) != 1:
             which = f"{len(hits)} recordings match {part!r}" if part else f"there are {len(hits)} recordings"
-            raise UserError(f"{which}: name one cell of {'; '.join(hits or recorded)}")
+            raise UserError(f"{which}: name one of {', '.join(map(repr, hits or recorded))}")
         return recorded[(exact or hits)[0]]
 
     def sweep(self) -> None:

@@ -357,7 +357,7 @@ def test_recordings_are_written_on_request_and_found_by_name(tmp_path: Path) -> 
     scores = (tmp_path / "run" / "results.csv").read_bytes()
     compare(tmp_path, "flat", "noise", record=True)
     assert (tmp_path / "run" / "results.csv").read_bytes() == scores
-    with pytest.raises(UserError, match="there are 2 recordings: name one cell of flat on"):
+    with pytest.raises(UserError, match="there are 2 recordings: name one of 'flat on"):
         store.recording()
     with pytest.raises(UserError, match="0 recordings match 'sgbm'"):
         store.recording("sgbm")
