@@ -4,6 +4,7 @@ import html
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -18,9 +19,15 @@ def test_every_command_is_run_in_one_way() -> None:
 
 @pytest.mark.parametrize("line", lines("install"), ids=str)
 def test_installing_is_what_ci_begins_with(line: str) -> None:
+    """Where other extras are named than there, they exist."""
     ci = (ROOT / ".ci" / "run").read_text().replace('"$place/venv', ".venv").replace('"', "")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     for part in line.split(" && "):
-        assert part.startswith("pip install ") or part in ci
+        if hit := re.fullmatch(r"pip install (?:-e )?'?(\.|[\w-]+)(?:\[([\w,]+)\])?'?", part):
+            assert hit[1] in (".", project["name"])
+            assert {*(hit[2] or "test").split(",")} <= project["optional-dependencies"].keys()
+        else:
+            assert part in ci
 
 
 @pytest.mark.parametrize("page", PAGES, ids=list(TEXT))

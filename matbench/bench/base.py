@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 from attrs import frozen
+from filelock import FileLock
 
 from matbench.bench.measuring import ROUNDS, Progress, Tree
 from matbench.bench.turns import Turns, in_turns
@@ -123,12 +124,12 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
     try:
         with ExitStack() as stack:
             place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="matbench-base-")))
-            code = stack.enter_context(_folder_alone(kept / "code", place / "code"))
+            code = stack.enter_context(_folder_alone(kept, place / "code"))
+            _git(here.code, "worktree", "prune")
             _git(here.code, "worktree", "add", "--detach", "--quiet", str(code), digest)
+            # numba takes a kernel as compiled if its file's path, time and size are the same
             for file in code.rglob("*.py"):
-                os.utime(
-                    file, (0, 0)
-                )  # numba takes a kernel as compiled if its file's path, time and size are the same
+                os.utime(file, (0, 0))
             environment = place / "venv"
             if _needs(code) == _needs(here.code):
                 progress(f"base {digest[:8]}: the libraries that are installed here")
@@ -147,19 +148,25 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
 
 
 @contextmanager
-def _folder_alone(wanted: Path, else_this: Path) -> Iterator[Path]:
-    """A new folder that goes when it ends; the other one where another process has the wanted one."""
-    wanted.parent.mkdir(parents=True, exist_ok=True)
+def _folder_alone(kept: Path, else_this: Path) -> Iterator[Path]:
+    """A folder that does not exist yet and goes when it ends; the other one while another process has the first.
+
+    What a process that was killed has left there goes, too: the system gives its lock back.
+    """
+    kept.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(kept / ".lock")
     try:
-        wanted.mkdir()
-    except FileExistsError:
-        else_this.mkdir()
+        lock.acquire(timeout=0)
+    except (OSError, NotImplementedError):  # another process has it (a `Timeout`), or nothing can be locked there
         yield else_this
         return
+    wanted = kept / "code"
     try:
+        shutil.rmtree(wanted, ignore_errors=True)
         yield wanted
     finally:
         shutil.rmtree(wanted, ignore_errors=True)
+        lock.release()
 
 
 def _python(environment: Path) -> Path:
