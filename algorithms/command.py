@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from matbench.algorithm import Context, Estimate
 from matbench.algorithms.sgbm import field_partner
-from matbench.datasets.pfm import read_disparities
+from matbench.files.pfm import read_disparities
 from matbench.scene import Scene
 
 PLACES = ("{left}", "{right}", "{ndisp}", "{out}")

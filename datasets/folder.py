@@ -21,12 +21,12 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from matbench.dataset import Listing
-from matbench.datasets.images import encoding, read_bytes
 from matbench.datasets.pair import CALIBRATION, pair
 from matbench.datasets.stored import StoredScene, TruthFile, inside
 from matbench.errors import UserError, unknown
+from matbench.files.images import encoding, read_bytes
 from matbench.scene import Range, Scene
+from matbench.scenes.dataset import Listing
 from matbench.spec import first_line
 
 TOML = "scene.toml"

@@ -14,11 +14,11 @@ from configparser import ConfigParser
 from configparser import Error as ConfigError
 from pathlib import Path
 
-from matbench.dataset import Listing
-from matbench.datasets.images import read_bytes
 from matbench.datasets.stored import StoredScene, TruthFile
 from matbench.errors import UserError, unknown
+from matbench.files.images import read_bytes
 from matbench.scene import Range, Scene
+from matbench.scenes.dataset import Listing
 from matbench.spec import first_line
 
 SIDE, SIZE = 9, (512, 512)

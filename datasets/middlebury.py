@@ -19,13 +19,13 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench import spec
-from matbench.dataset import Download, Listing, Remote
 from matbench.datasets.choose import search_range, views_and_reference
-from matbench.datasets.images import has_pixels, read_grey, read_rgb, read_size
 from matbench.datasets.registry import YEARS, Facts, Layout, Registry, registry, site
 from matbench.errors import UserError, unknown
+from matbench.files.images import has_pixels, read_grey, read_rgb, read_size
 from matbench.regions import regions
 from matbench.scene import Range, Scene
+from matbench.scenes.dataset import Download, Listing, Remote
 
 OPTIONS = ("baseline", "disparities", "ref", "size", "views")
 ROUND_UP = 16  # px of the pair, for ranges that come from the truth itself

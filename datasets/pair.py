@@ -10,9 +10,9 @@ Reference: Scharstein et al., GCPR 2014; https://vision.middlebury.edu/stereo/da
 import re
 from pathlib import Path
 
-from matbench.datasets.images import read_bytes
 from matbench.datasets.stored import StoredScene, TruthFile, inside
 from matbench.errors import UserError
+from matbench.files.images import read_bytes
 from matbench.scene import Range
 
 CALIBRATION = "calib.txt"

@@ -11,13 +11,13 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench import alignment
 from matbench.datasets.folder import MOST_VIEWS, TOML
-from matbench.datasets.images import encoding, read_rgb, read_size
 from matbench.datasets.pair import CALIBRATION
 from matbench.errors import UserError
+from matbench.files.images import encoding, read_rgb, read_size
+from matbench.files.writing import write_text
 from matbench.scene import Range
-from matbench.store import write_text
+from matbench.scenes import alignment
 
 _IMAGES = (".png", ".ppm", ".pgm")
 _NOT_READ = (".bmp", ".exr", ".gif", ".jpeg", ".jpg", ".tif", ".tiff", ".webp")

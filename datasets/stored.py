@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.datasets.choose import search_range, views_and_reference
-from matbench.datasets.images import encoding, read_levels, read_rgb, read_size
-from matbench.datasets.pfm import read_disparities
 from matbench.errors import UserError, unknown
+from matbench.files.images import encoding, read_levels, read_rgb, read_size
+from matbench.files.pfm import read_disparities
 from matbench.regions import regions
 from matbench.scene import Range, Scene
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matbench.comparison import compare
     from matbench.errors import UserError
     from matbench.scene import Range, Scene
-    from matbench.scenes import load_scene
+    from matbench.scenes.catalogue import load_scene
     from matbench.space import DisparitySpace, Volume, visibility
 
 _HOMES = {
@@ -27,7 +27,7 @@ _HOMES = {
     "UserError": "errors",
     "Volume": "space",
     "compare": "comparison",
-    "load_scene": "scenes",
+    "load_scene": "scenes.catalogue",
     "visibility": "space",
 }
 

@@ -12,23 +12,28 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from matbench import plugins, provenance, run, scorer, scoring, spec
-from matbench.dataset import Listing
+from matbench import spec
 from matbench.errors import UserError, unknown
-from matbench.lock import locked
-from matbench.plan import Cell, Plan, make_plan, methods
-from matbench.recorded import Recording
-from matbench.repeats import unsteady
+from matbench.files.writing import write_text
+from matbench.measures.volumes import StoredVolume
+from matbench.plans import plugins
+from matbench.plans.plan import Cell, Plan, make_plan, methods
+from matbench.plans.record_option import Recording
+from matbench.plans.settings import Settings
+from matbench.results import freshness, scores
+from matbench.results.repeats import unsteady
+from matbench.runs import provenance
+from matbench.runs.lock import locked
+from matbench.runs.store import FolderLost, Outcome, Store
 from matbench.scene import NotInScene, Scene
-from matbench.scenes import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
-from matbench.settings import Settings
-from matbench.store import FolderLost, Outcome, Store, write_text
-from matbench.volumes import StoredVolume
+from matbench.scenes.catalogue import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
+from matbench.scenes.dataset import Listing
+from matbench.solving import run
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from matbench.sweeps import Sweep
+    from matbench.results.sweeps import Sweep
 
 SYNTHETIC_SCENES = ("synthetic/box", "synthetic/curved", "synthetic/weak")
 RUNS = Path("runs")
@@ -91,18 +96,18 @@ class Comparison:
 
     def tables(self) -> "tuple[pd.DataFrame, pd.DataFrame]":
         """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
-        results = scoring.results(self.plan, self.store, self.scenes)
-        cells = scoring.cells(self.plan, self.store)
+        results = scores.results(self.plan, self.store, self.scenes)
+        cells = scores.cells(self.plan, self.store)
         with locked(self.folder):
             self.store.sweep()
             for name, table in (("results.csv", results), ("cells.csv", cells)):
                 write_text(self.folder / name, table.to_csv(index=False))
-            scorer.record(self.plan, self.store, self.scenes)
+            freshness.record(self.plan, self.store, self.scenes)
         return results, cells
 
     def sweeps(self, results: "pd.DataFrame") -> "list[Sweep]":
         """The curves of whatever takes several numbers; written as ``sweeps.csv`` if there are any."""
-        from matbench.sweeps import sweeps, table
+        from matbench.results.sweeps import sweeps, table
 
         found = sweeps(self.plan, results)
         if found:
@@ -111,8 +116,8 @@ class Comparison:
 
     def ablation(self, results: "pd.DataFrame") -> "pd.DataFrame":
         """What each factor does; written as ``ablation.csv`` and ``ablation.tex``, too."""
-        from matbench.ablation import ablation
         from matbench.reports import switches
+        from matbench.results.ablation import ablation
 
         table = ablation(self.plan, results)
         write_text(self.folder / "ablation.csv", table.to_csv(index=False))
@@ -129,7 +134,7 @@ class Comparison:
         """Write ``report.html``."""
         from matbench.reports import page
 
-        reliability = scoring.reliabilities(self.plan, self.store, self.scenes)
+        reliability = scores.reliabilities(self.plan, self.store, self.scenes)
         if len(reliability):
             write_text(self.folder / "reliability.csv", reliability.to_csv(index=False))
         stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.scored}
@@ -161,7 +166,7 @@ class Comparison:
                 ablation=ablation,
                 sweeps=tuple(sweeps),
                 reliability=reliability,
-                higher=frozenset(m.name for m in scoring.metrics() if m.better == "higher"),
+                higher=frozenset(m.name for m in scores.metrics() if m.better == "higher"),
                 volumes=volume,
                 histories={key: outcome.history for key, outcome in outcomes.items() if outcome is not None},
                 parameters={(c.method.algorithm, c.method.changed): c.method.params for c in self.plan.cells},
@@ -176,7 +181,7 @@ class Comparison:
 
         outcomes = [o for o in (self.store.outcome(cell, whole=False) for cell in self.plan.cells) if o is not None]
         threads = [{"threads": str(o.threads)} for o in outcomes if o.threads]
-        seeds = {"seeds": ", ".join(str(seed) for seed in self.plan.request["seeds"]), "scorer": scorer.digest()}
+        seeds = {"seeds": ", ".join(str(seed) for seed in self.plan.request["seeds"]), "scorer": freshness.digest()}
         facts = {**provenance.combined([*(o.ran_on for o in outcomes), *threads]), **seeds}
         if differing := unsteady(self.plan, self.store):
             facts["not repeatable"] = "; ".join(differing)

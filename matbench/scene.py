@@ -112,7 +112,7 @@ class Scene:
         View index i -> (n, H, W) bool: does view j see the surface point that view i sees at this
         pixel? Only where it is known exactly (synthetic scenes).
     held_out
-        A further view that is to be predicted, if that was asked for (`matbench.prediction`).
+        A further view that is to be predicted, if that was asked for (`matbench.measures.prediction`).
 
     Raises
     ------

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from attrs import frozen
 
+from matbench.files.writing import write_bytes, write_text
 from matbench.reports.paper import tex
-from matbench.store import write_bytes, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,9 +10,18 @@ import numpy as np
 from attrs import define, evolve, field, frozen
 from numpy.typing import NDArray
 
-from matbench.coloring import DISPARITY, ERROR, UNKNOWN, Picture, colors, disparity_ends, palette, truth_colors
-from matbench.consistency import left_over
+from matbench.recording.coloring import (
+    DISPARITY,
+    ERROR,
+    UNKNOWN,
+    Picture,
+    colors,
+    disparity_ends,
+    palette,
+    truth_colors,
+)
 from matbench.scene import Scene
+from matbench.scenes.photo_consistency import left_over
 
 WIDTH = 1800  # px
 SHOWN = 15  # at most so many views and truth maps; of more, evenly chosen ones

@@ -7,10 +7,10 @@ import pandas as pd
 from attrs import field, frozen
 from numpy.typing import NDArray
 
+from matbench.measures.volumes import StoredVolume
+from matbench.results.sweeps import Sweep
 from matbench.scene import Scene
 from matbench.spec import Value
-from matbench.sweeps import Sweep
-from matbench.volumes import StoredVolume
 
 Key = tuple[str, str, str, int]
 """Algorithm, parameters, scene and seed: the names of a cell."""
@@ -48,11 +48,11 @@ class Report:
     facts
         What it ran on, as shown: ``{"numpy": "2.4.1", "processor": ...}``.
     ablation
-        What each factor does (`matbench.ablation.COLUMNS`), if that was asked for.
+        What each factor does (`matbench.results.ablation.COLUMNS`), if that was asked for.
     sweeps
         What took several numbers, as curves.
     reliability
-        Reliability curves of the volumes that were kept (`matbench.scoring.reliabilities`).
+        Reliability curves of the volumes that were kept (`matbench.results.scores.reliabilities`).
     higher
         Metrics of which more is better; of all others, less is.
     volumes

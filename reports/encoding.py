@@ -7,7 +7,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench.coloring import WORST
+from matbench.recording.coloring import WORST
 from matbench.scene import Scene
 
 FINER = 8

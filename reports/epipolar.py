@@ -8,10 +8,10 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from matbench.drawing import as_bytes
+from matbench.measures.volumes import StoredVolume
+from matbench.recording.drawing import as_bytes
 from matbench.scene import Scene
 from matbench.space import Volume, visibility
-from matbench.volumes import StoredVolume
 
 PLANES = 96
 """Most planes of a slice of similarity."""

@@ -7,7 +7,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench.metrics import TIE, error_map
+from matbench.measures.metrics import TIE, error_map
 from matbench.regions import seen_from
 from matbench.reports import figures
 from matbench.reports.tables import REGIONS, Shared

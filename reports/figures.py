@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from matbench.coloring import palette
+from matbench.recording.coloring import palette
 from matbench.reports.tables import label
 
 if TYPE_CHECKING:
@@ -229,7 +229,7 @@ def reliability(curves: pd.DataFrame | None) -> "Figure | None":
     Parameters
     ----------
     curves
-        As `matbench.scoring.reliabilities` gives them; None or empty gives no figure.
+        As `matbench.results.scores.reliabilities` gives them; None or empty gives no figure.
     """
     if curves is None or curves.empty:
         return None

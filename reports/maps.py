@@ -7,8 +7,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench import coloring
 from matbench.errors import UserError
+from matbench.recording import coloring
 from matbench.reports.columns import INCHES, TALLEST, Drawn, Width, letter, look
 from matbench.reports.figures import printable
 from matbench.scene import Scene

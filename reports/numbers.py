@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 from attrs import frozen
 
+from matbench.measures.statistics import Effect
 from matbench.reports import standing, tables
 from matbench.reports.content import Report
 from matbench.reports.standing import Difference
 from matbench.reports.tables import METRIC, REGION, Shared
-from matbench.statistics import Effect
 
 THRESHOLD = re.compile(r"(bad|total_bad)_(\d+(?:\.\d+)?)")
 """Metrics that are one number at several thresholds."""

@@ -12,15 +12,15 @@ import pandas as pd
 from attrs import evolve
 from markupsafe import Markup, escape
 
-from matbench import coloring
+from matbench.files.writing import write_text
+from matbench.measures.statistics import FEW
+from matbench.recording import coloring
 from matbench.regions import REGIONS
 from matbench.reports import curves, errors, figures, passes, switches, tables
 from matbench.reports.content import Report
 from matbench.reports.numbers import COSTS, Numbers
 from matbench.reports.pictures import gallery
 from matbench.reports.tables import METRIC, REGION, Shared
-from matbench.statistics import FEW
-from matbench.store import write_text
 
 __all__ = ["Report", "render", "write"]
 if TYPE_CHECKING:

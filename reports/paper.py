@@ -15,10 +15,10 @@ import pandas as pd
 from attrs import frozen
 
 from matbench.errors import UserError, unknown
+from matbench.measures.statistics import FEW
 from matbench.reports import standing, tables
 from matbench.reports.tables import METRIC, REGION, REGIONS, Shared
 from matbench.spec import first_line
-from matbench.statistics import FEW
 
 Format = Literal["tex", "md", "csv"]
 FORMATS: tuple[Format, ...] = get_args(Format)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from attrs import frozen
 
-from matbench import coloring
+from matbench.recording import coloring
 from matbench.reports import epipolar, errors
 from matbench.reports.content import Report
 from matbench.reports.encoding import LEAST_SIDE, Coding, exact, photograph, side_for, size_within

@@ -6,9 +6,9 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench import coloring, drawing
 from matbench.algorithm import Estimate
-from matbench.listening import RecordingProbe
+from matbench.recording import coloring, drawing
+from matbench.recording.probe import RecordingProbe
 from matbench.reports.columns import INCHES, Drawn, Width, letter, look
 from matbench.scene import Scene
 from matbench.space import DisparitySpace

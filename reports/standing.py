@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 from attrs import frozen
 
+from matbench.measures.statistics import Effect, paired_effects
 from matbench.reports.tables import Shared, text
 from matbench.spec import read_scene
-from matbench.statistics import Effect, paired_effects
 
 REFERENCES = 12
 """Methods that all others are compared with, the best by the summary: pairs grow with the square."""
@@ -50,7 +50,7 @@ def mean_ranks(table: pd.DataFrame, scope: Shared, unit: str, higher: bool) -> d
 
 @frozen
 class Difference:
-    """How far a method is from another, as `matbench.statistics.Effect` of their differences."""
+    """How far a method is from another, as `matbench.measures.statistics.Effect` of their differences."""
 
     method: str
     reference: str

@@ -1,16 +1,12 @@
 """The tables of a run: whatever shows numbers takes them from here, so that all agree."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import pandas as pd
 from attrs import frozen
 
 from matbench.regions import VIEW_REGIONS
 from matbench.spec import read_scene
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 METRIC, REGION = "total_bad_1", "all"
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
@@ -251,12 +247,3 @@ def places(values: pd.Series, unit: str, higher: bool = False) -> pd.Series:
         return pd.Series(0, values.index)
     better = [sum(other < v for other in shown) if v == v else len(shown) for v in shown]
     return pd.Series([b + 1 if b < 2 else 0 for b in better], values.index)
-
-
-def terminal(
-    results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False, width: int = 80
-) -> "list[Table]":
-    """The summary, the scenes one by one and what went wrong, for a terminal of 80 columns or more."""
-    from matbench.reports.terminal import tables
-
-    return tables(results, cells, metric, higher, width)

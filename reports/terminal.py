@@ -7,6 +7,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from matbench.measures.statistics import FEW
 from matbench.reports.tables import (
     METRIC,
     REGION,
@@ -23,7 +24,6 @@ from matbench.reports.tables import (
     timing_note,
 )
 from matbench.reports.tables import text as shown
-from matbench.statistics import FEW
 
 WIDTH = 80
 NARROW = ("disc", "textureless")

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import pytest
 from machines import Machines
 
-from matbench import contract
-from matbench.plugins import kernel_cache
+from matbench.plans.plugins import kernel_cache
+from matbench.solving import method_check
 
 if TYPE_CHECKING:
     from following import Desk
@@ -62,14 +62,14 @@ def machines(tmp_path: Path) -> Iterator[Machines]:
 
 
 @pytest.fixture(scope="module")
-def smaller() -> Iterator[dict[str, contract.Trial]]:
+def smaller() -> Iterator[dict[str, method_check.Trial]]:
     """What `check` tries, on scenes of two thirds the size."""
     with pytest.MonkeyPatch.context() as patch:
         for name in ("EASY", "EITHER_SIGN"):
-            patch.setattr(contract, name, getattr(contract, name).replace("]", " size=160x120]"))
-        contract.trials.cache_clear()
-        yield dict(contract.trials())
-    contract.trials.cache_clear()
+            patch.setattr(method_check, name, getattr(method_check, name).replace("]", " size=160x120]"))
+        method_check.trials.cache_clear()
+        yield dict(method_check.trials())
+    method_check.trials.cache_clear()
 
 
 class Site:

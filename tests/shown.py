@@ -1,11 +1,10 @@
 """What the README and the pages in docs/ show: commands and code."""
 
 import re
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
-ROOT = Path(__file__).parent.parent
 README = ROOT / "README.md"
 if not README.exists():
     pytest.skip("no README beside the tests", allow_module_level=True)

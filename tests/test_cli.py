@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from places import METHODS
 
 from matbench.cli import main
 
-METHODS = Path(__file__).with_name("methods.py")
 SMALL = "synthetic/box[size=96x72]"
 
 
@@ -138,13 +138,13 @@ number = broken_package.odd:number
 hint = broken_package.odd:Hint
 [matbench.datasets]
 odd = broken_package.odd:number
-[matbench.metrics]
+[matbench.measures.metrics]
 missing = broken_package.odd:missing
 odd = broken_package.odd:number
 failing = broken_package.odd:failing
 """
 ODD = """\
-from matbench.metrics import Metric
+from matbench.measures.metrics import Metric
 number = 3
 failing = Metric("failing", "px", "lower", "always fails", lambda errors: 1 / 0)
 class Hint:

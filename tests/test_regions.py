@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from matbench.datasets.images import read_grey
 from matbench.datasets.middlebury import MIDDLEBURY_2001, MIDDLEBURY_2003
 from matbench.datasets.synthetic import SYNTHETIC, WORLDS
+from matbench.files.images import read_grey
 from matbench.regions import VIEW_REGIONS, near_jumps, regions, seen_from, textureless, view_regions
 from matbench.scene import Scene
 

@@ -9,7 +9,6 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench import spec
-from matbench.dataset import Listing
 from matbench.datasets.choose import search_range, views_and_reference
 from matbench.datasets.synthetic.cameras import LARGEST, NAMES, Strengths, exposed, heights
 from matbench.datasets.synthetic.rendering import Rig
@@ -18,6 +17,7 @@ from matbench.datasets.synthetic.worlds import WORLDS, World
 from matbench.errors import UserError, unknown
 from matbench.regions import regions
 from matbench.scene import Range, Scene
+from matbench.scenes.dataset import Listing
 from matbench.space import DisparitySpace, Volume, surface
 
 OPTIONS = tuple(sorted((*NAMES, "baseline", "disparities", "n", "ref", "seed", "size", "views")))

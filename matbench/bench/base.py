@@ -19,8 +19,8 @@ from filelock import FileLock
 from matbench.bench.measuring import ROUNDS, Progress, Tree
 from matbench.bench.turns import Turns, in_turns
 from matbench.errors import UserError
-from matbench.plugins import kernel_cache
-from matbench.statistics import CONFIDENCE
+from matbench.measures.statistics import CONFIDENCE
+from matbench.plans.plugins import kernel_cache
 
 PAIRS = 4
 """Pairs of processes: each gives one ratio of every subject, and where their memory lies differs."""

@@ -9,14 +9,15 @@ import numpy as np
 from attrs import define, evolve, field, frozen
 from numpy.typing import NDArray
 
-from matbench import plugins, spec
+from matbench import spec
 from matbench.algorithm import Algorithm, Context
 from matbench.bench.roofline import Roofline
 from matbench.bench.roofline import measure as measure_roofline
 from matbench.errors import unknown
+from matbench.measures.statistics import CONFIDENCE
+from matbench.plans import plugins
 from matbench.scene import Scene
-from matbench.scenes import load_scene
-from matbench.statistics import CONFIDENCE
+from matbench.scenes.catalogue import load_scene
 
 METHODS = {
     "materiality": "materiality[views=0 fineness=1]",

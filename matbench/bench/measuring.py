@@ -16,8 +16,8 @@ import numpy as np
 from attrs import frozen
 
 from matbench.errors import UserError, unknown
-from matbench.plugins import kernel_cache
-from matbench.statistics import median_interval
+from matbench.measures.statistics import median_interval
+from matbench.plans.plugins import kernel_cache
 
 BENCHMARKS = Path("tests", "benchmarks")
 ROUNDS, PARTS = 25, 3

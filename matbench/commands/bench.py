@@ -12,7 +12,7 @@ import attrs
 from attrs import field, frozen
 from cyclopts import App, Parameter
 
-from matbench.cli import DONE, FAILED, Console
+from matbench.commands.console import DONE, FAILED, Console
 from matbench.errors import UserError
 
 REGRESSION = 3
@@ -350,7 +350,7 @@ def _against(
 
 def _grow(choice: Choice, seconds: float, out: Path | None, output: _Output) -> int:
     """Growth over pixels, disparities and views."""
-    from matbench.plugins import kernel_cache
+    from matbench.plans.plugins import kernel_cache
 
     os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))  # numba reads it when it is imported
     from matbench.bench import growth, growth_report

@@ -12,11 +12,14 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Column, Table
 
-from matbench import contract, limits, plugins, spec
-from matbench.cli import DONE, FAILED, Console, Plugins
+from matbench import spec
+from matbench.commands.console import DONE, FAILED, Console
+from matbench.commands.options import Plugins
 from matbench.errors import UserError
-from matbench.plan import Method
-from matbench.plan import methods as chosen
+from matbench.plans import limits, plugins
+from matbench.plans.plan import Method
+from matbench.plans.plan import methods as chosen
+from matbench.solving import method_check
 
 app = App(
     name="check",
@@ -59,7 +62,7 @@ def check(
     patience = limits.seconds(timeout) or math.inf
     ready, files = _read(method, plugin)
     console = Console()
-    results: list[tuple[Method, list[contract.Finding]]] = []
+    results: list[tuple[Method, list[method_check.Finding]]] = []
     columns = (BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     shown = console.is_terminal and not as_json
     for one in ready:
@@ -69,7 +72,7 @@ def check(
             def listen(done: int, total: int, name: str) -> None:
                 progress.update(task, completed=done, total=total, description=escape(f"{one}: {name}"))  # noqa: B023
 
-            results.append((one, contract.check(one, files, patience, listen)))
+            results.append((one, method_check.check(one, files, patience, listen)))
         if not as_json:
             console.print(_table(*results[-1]))
             console.say(_summary(*results[-1]))
@@ -95,20 +98,20 @@ def _read(names: Sequence[str], plugin: Sequence[Path]) -> tuple[list[Method], l
     return chosen(selectors, list(dict.fromkeys(files))), list(dict.fromkeys(files))
 
 
-def _passes(found: Sequence[contract.Finding]) -> bool:
+def _passes(found: Sequence[method_check.Finding]) -> bool:
     """No check fails, and not everything was skipped."""
     verdicts = [finding.verdict for finding in found if finding.check != "quiet"]
     return "fail" not in verdicts and "pass" in verdicts
 
 
-def _summary(method: Method, found: Sequence[contract.Finding]) -> str:
+def _summary(method: Method, found: Sequence[method_check.Finding]) -> str:
     failed = [finding.check for finding in found if finding.verdict == "fail"]
     if failed:
         return f"{method} fails: {', '.join(failed)}"
     return f"{method} passes" if _passes(found) else f"{method}: nothing could be tried"
 
 
-def _table(method: Method, found: Sequence[contract.Finding]) -> Table:
+def _table(method: Method, found: Sequence[method_check.Finding]) -> Table:
     table = Table(
         Column("check", no_wrap=True), Column("", no_wrap=True), "what is asked", "what was found",
         title=escape(str(method)), title_justify="left",

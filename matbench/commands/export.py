@@ -5,8 +5,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from matbench.archive import export as write
-from matbench.cli import DONE, Console
+from matbench.commands.console import DONE, Console
+from matbench.results.archive import export as write
 
 app = App(
     name="export",

@@ -8,13 +8,13 @@ from cyclopts import App, Parameter
 from rich.markup import escape
 from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn
 
-from matbench.cli import DONE, FAILED, INTERRUPTED, Console
-from matbench.dataset import Download
-from matbench.downloads import downloads, fetch_root
+from matbench.commands.console import DONE, FAILED, INTERRUPTED, Console
 from matbench.errors import UserError
-from matbench.fetching import Event, Result, look, site_of
-from matbench.fetching import fetch as bring
-from matbench.transfer import PATIENCE, Patience
+from matbench.files.transfer import PATIENCE, Patience
+from matbench.scenes.dataset import Download
+from matbench.scenes.downloads import downloads, fetch_root
+from matbench.scenes.fetching import Event, Result, look, site_of
+from matbench.scenes.fetching import fetch as bring
 
 app = App(
     name="fetch",

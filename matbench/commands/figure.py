@@ -9,16 +9,17 @@ import numpy as np
 from attrs import evolve
 from cyclopts import App, Parameter
 
-from matbench.cli import DONE, Console, Data, Plugins
+from matbench.commands.console import DONE, Console
+from matbench.commands.options import Data, Plugins
 from matbench.errors import UserError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from matbench.plan import Cell
+    from matbench.plans.plan import Cell
     from matbench.reports.columns import Drawn
+    from matbench.runs.store import Store
     from matbench.scene import Scene
-    from matbench.store import Store
 
 app = App(
     name="figure",
@@ -72,14 +73,15 @@ def slice_(
     cell
         Part of the cell's name or key; not needed where there is only one.
     """
-    from matbench import plugins, spec
+    from matbench import spec
     from matbench.algorithm import Context
-    from matbench.limits import cores
-    from matbench.listening import RecordingProbe
-    from matbench.recorded import Recording
+    from matbench.plans import plugins
+    from matbench.plans.limits import cores
+    from matbench.plans.record_option import Recording
+    from matbench.recording.probe import RecordingProbe
     from matbench.reports import slices
-    from matbench.store import Store
-    from matbench.worker import checked, hide_truth
+    from matbench.runs.store import Store
+    from matbench.solving.worker import checked, hide_truth
 
     store, console = Store(run), Console()
     plan = store.plan()
@@ -153,7 +155,7 @@ def maps(
         Folder of a finished run.
     """
     from matbench.reports import maps as figure
-    from matbench.store import Store
+    from matbench.runs.store import Store
 
     store, console = Store(run), Console()
     cells = store.plan().cells
@@ -207,7 +209,7 @@ def _matching(kind: str, names: list[str], wanted: list[str] | None) -> list[str
 
 def _scene(cell: "Cell", data: Path | None, console: Console) -> "Scene":
     """The scene of a cell, as it was in the run."""
-    from matbench.scenes import load_scene
+    from matbench.scenes.catalogue import load_scene
 
     with console.status(f"{cell.scene}: reading"):
         scene = load_scene(cell.scene, data)

@@ -11,9 +11,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from matbench.cli import Console
-from matbench.plan import Cell
-from matbench.store import FINAL, Outcome
+from matbench.commands.console import Console
+from matbench.plans.plan import Cell
+from matbench.runs.store import FINAL, Outcome
 
 SHOWN = 8  # cells that run at once and are named
 _BAR = 24

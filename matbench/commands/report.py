@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from matbench.cli import DONE, Console
+from matbench.commands.console import DONE, Console
 from matbench.errors import UserError
 
 app = App(
@@ -50,9 +50,9 @@ def report(
     run
         Folder of a finished run.
     """
-    from matbench import scoring
-    from matbench.reports import paper, tables
-    from matbench.store import write_text
+    from matbench.files.writing import write_text
+    from matbench.reports import paper, terminal
+    from matbench.results import scores
 
     if format is None and out is not None:
         ending = out.suffix.lower().removeprefix(".")
@@ -62,11 +62,11 @@ def report(
     if out is not None and not out.parent.is_dir():
         raise UserError(f"folder {str(out.parent)!r} of --out does not exist")
     results, cells = paper.read(run)
-    higher = any(m.name == metric and m.better == "higher" for m in scoring.metrics())
+    higher = any(m.name == metric and m.better == "higher" for m in scores.metrics())
     made = paper.sheet(results, cells, metric, higher, region or (), scenes)
     console = Console()
     if format is None:
-        for table in tables.terminal(results, cells, metric, higher, console.width):
+        for table in terminal.tables(results, cells, metric, higher, console.width):
             console.print(table)
         return DONE
     text = paper.write(made, format)

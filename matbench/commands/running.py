@@ -12,18 +12,19 @@ from typing import Any
 
 from attrs import frozen
 
-from matbench import scoring
-from matbench.cli import DONE, FAILED, INTERRUPTED, Console, Options
+from matbench.commands.console import DONE, FAILED, INTERRUPTED, Console
+from matbench.commands.options import Options
 from matbench.commands.progress import Progress
 from matbench.comparison import Comparison
-from matbench.limits import crowded
-from matbench.lock import locked
-from matbench.repeats import unsteady
-from matbench.reports import curves, tables
+from matbench.plans.limits import crowded
+from matbench.reports import curves, tables, terminal
 from matbench.reports import switches as effects
-from matbench.scenes import DATA_VARIABLE, data_root
-from matbench.store import FINAL, FolderLost
-from matbench.todo import explained, pending
+from matbench.results import scores
+from matbench.results.repeats import unsteady
+from matbench.runs.lock import locked
+from matbench.runs.store import FINAL, FolderLost
+from matbench.runs.todo import explained, pending
+from matbench.scenes.catalogue import DATA_VARIABLE, data_root
 
 
 @frozen
@@ -199,7 +200,7 @@ def _plain(value: Any) -> Any:
 
 
 def _better(metric: str) -> str:
-    return next(m.better for m in scoring.metrics() if m.name == metric)
+    return next(m.better for m in scores.metrics() if m.name == metric)
 
 
 def _higher(metric: str) -> bool:
@@ -264,7 +265,7 @@ def _measured(results: Any, metric: str, voice: Voice) -> str:
 
 
 def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
-    for table in tables.terminal(results, cells, metric, _higher(metric), console.width):
+    for table in terminal.tables(results, cells, metric, _higher(metric), console.width):
         console.print(table)
     for table in curves.terminal(sweeps, metric):
         console.print(table)

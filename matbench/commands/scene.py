@@ -7,7 +7,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from matbench.cli import DONE, FAILED, Console, Data
+from matbench.commands.console import DONE, FAILED, Console
+from matbench.commands.options import Data
 from matbench.errors import UserError
 
 app = App(
@@ -50,9 +51,9 @@ def show(
     names
         Scenes or patterns, as for `compare`; the path of a folder is a scene of your own.
     """
+    from matbench.files.writing import write_bytes
     from matbench.reports.contact_sheet import contact_sheet
-    from matbench.scenes import load_scene, select
-    from matbench.store import write_bytes
+    from matbench.scenes.catalogue import load_scene, select
 
     if not names:
         raise UserError("no scene: name one, such as 'matbench scene show synthetic/curved'")
@@ -76,7 +77,7 @@ def show(
             write_bytes(path, contact_sheet(scene))
         console.say(f"contact sheet: {path}")
         if record:
-            from matbench.recording import record_scene
+            from matbench.recording.rrd import record_scene
 
             with console.status(f"{name}: recording"):
                 record_scene(path.with_suffix(".rrd"), scene)
@@ -86,7 +87,7 @@ def show(
 
 def _file_name(scene: str) -> str:
     """``middlebury2003/teddy[size=half]`` -> ``middlebury2003-teddy-size-half``; a folder's last part."""
-    from matbench.scenes import own_folder
+    from matbench.scenes.catalogue import own_folder
     from matbench.spec import parse
 
     spec = parse(scene)[0]
@@ -117,9 +118,9 @@ def check(name: str, *, data: Data = None) -> int:
     """
     from rich.text import Text
 
-    from matbench.checking import Finding, check
     from matbench.datasets.folder import describe
-    from matbench.scenes import load_scene, own_folder
+    from matbench.scenes.catalogue import load_scene, own_folder
+    from matbench.scenes.scene_check import Finding, check
     from matbench.spec import parse
 
     console, problems, files = Console(), 0, None

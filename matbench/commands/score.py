@@ -8,14 +8,15 @@ from typing import Annotated
 import pandas as pd
 from cyclopts import App, Parameter
 
-from matbench import archive, scorer
-from matbench.cli import DONE, FAILED, Console, Data, check_metric
 from matbench.commands import running
+from matbench.commands.console import DONE, FAILED, Console
+from matbench.commands.options import Data, check_metric
 from matbench.errors import UserError
-from matbench.lock import locked
 from matbench.reports.tables import METRIC
-from matbench.store import Store
-from matbench.stored import join, open_run
+from matbench.rescoring import join, open_run
+from matbench.results import archive, freshness
+from matbench.runs.lock import locked
+from matbench.runs.store import Store
 
 app = App(
     name="score",
@@ -91,7 +92,7 @@ def _folder(run: Path, aside: Path, console: Console) -> Path:
 
 def _claimed(folder: Path) -> str:
     """The scorer that an archive's tables say they are from."""
-    made = scorer.made(Store(folder))
+    made = freshness.made(Store(folder))
     return made.scorer if made else "an unknown one"
 
 
@@ -114,8 +115,8 @@ def _score(folder: Path, data: Path | None, partial: bool, metric: str, console:
         console.say(f"  {line}")
     if claimed is None:
         return DONE
-    if claimed != scorer.digest():
-        console.say(f"the archive's scores are by another scorer ({claimed}, here {scorer.digest()})")
+    if claimed != freshness.digest():
+        console.say(f"the archive's scores are by another scorer ({claimed}, here {freshness.digest()})")
     return FAILED
 
 

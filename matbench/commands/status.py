@@ -6,9 +6,9 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from matbench.cli import DONE, Console
+from matbench.commands.console import DONE, Console
 from matbench.commands.progress import duration
-from matbench.status import Standing, prune, standing
+from matbench.results.status import Standing, prune, standing
 
 app = App(
     name="status",

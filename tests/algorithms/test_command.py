@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from places import PROGRAMS
 
 from matbench import Context, Range, Scene
 from matbench.algorithms.command import Command
 from matbench.comparison import default_algorithms, prepare
-from matbench.contract import check, mirrored
 from matbench.errors import UserError
-from matbench.plan import methods
-from matbench.scenes import load_scene
+from matbench.plans.plan import methods
+from matbench.scenes.catalogue import load_scene
+from matbench.solving.method_check import check, mirrored
 
-PROGRAMS = Path(__file__).parents[1] / "programs"
 MATCHER = (PROGRAMS / "block_matcher.py").read_text()
 START = """
 import sys, time, os
@@ -203,7 +203,7 @@ def test_a_hanging_program_ends_with_the_process_that_waits_for_it(tmp_path: Pat
     hanging = program(tmp_path / "hangs", HANGS)
     code = (
         "import sys; from matbench import Context; from matbench.algorithms.command import Command\n"
-        "from matbench.scenes import load_scene\n"
+        "from matbench.scenes.catalogue import load_scene\n"
         "Command(sys.argv[1]).solve(load_scene('synthetic/box[n=2 size=64x48]'), Context())"
     )
     waiting = subprocess.Popen([sys.executable, "-c", code, hanging])

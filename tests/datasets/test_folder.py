@@ -13,7 +13,7 @@ from matbench import load_scene
 from matbench.datasets.folder import describe, labels
 from matbench.errors import UserError
 from matbench.scene import Range
-from matbench.scenes import own_folder, select
+from matbench.scenes.catalogue import own_folder, select
 
 WORLD = Layers(near=6.0, far=2.0)
 TRUTH = WORLD.truth()

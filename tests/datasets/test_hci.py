@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from scene_files import Layers, check_one_line, pfm_bytes, write_png
 
 from matbench import load_scene
-from matbench.consistency import together, warping_errors
 from matbench.datasets.hci import RANGE, SCENES, read_range
 from matbench.errors import UserError
 from matbench.scene import Range, Scene
-from matbench.scenes import listings, select
+from matbench.scenes.catalogue import listings, select
+from matbench.scenes.photo_consistency import together, warping_errors
 
 WORLD = Layers()
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scene_files import CALIB, Layers, check_one_line, write_pair
 
 from matbench import load_scene
-from matbench.consistency import together, warping_errors
 from matbench.datasets.pair import pair
 from matbench.errors import UserError
 from matbench.scene import Range
+from matbench.scenes.photo_consistency import together, warping_errors
 
 WORLD = Layers(near=9.5, far=3.25)
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from matbench.datasets import make_registry
-from matbench.datasets.images import pixel_digests, read_size
 from matbench.datasets.middlebury import ROUND_UP, Middlebury
 from matbench.datasets.registry import REGISTRY, YEARS, registry
 from matbench.errors import UserError
+from matbench.files.images import pixel_digests, read_size
 
 KNOWN = {year: registry(year) for year in YEARS}
 SCENES = [

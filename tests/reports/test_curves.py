@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 from attrs import evolve
 
+from matbench.measures.statistics import FEW
 from matbench.reports import curves, figures, page
 from matbench.reports.content import Report
-from matbench.statistics import FEW
-from matbench.sweeps import COLUMNS, Sweep
+from matbench.results.sweeps import COLUMNS, Sweep
 
 METHODS = (("good", ""), ("<b>&", "x=$1 y=_"))
 VALUES = (0.0, 2.0, 4.5)

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from matbench.measures.volumes import StoredVolume
 from matbench.reports import page, tables
 from matbench.reports.content import Report
 from matbench.reports.numbers import Numbers
 from matbench.space import DisparitySpace, Volume, surface
-from matbench.volumes import StoredVolume
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: pip install -e '.[test]'")
 

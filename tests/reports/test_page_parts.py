@@ -10,16 +10,16 @@ from attrs import evolve
 from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
-from matbench.metrics import total_bad
+from matbench.measures.metrics import total_bad
+from matbench.measures.statistics import Effect, intervals, paired_effect, paired_effects
+from matbench.measures.volumes import StoredVolume
 from matbench.regions import view_regions
 from matbench.reports import epipolar, errors, page, passes, pictures, standing, tables
 from matbench.reports.content import Report
 from matbench.reports.encoding import FINER, LEAST_SIDE, Coding, photograph, side_for
 from matbench.reports.numbers import Numbers
-from matbench.scenes import load_scene
+from matbench.scenes.catalogue import load_scene
 from matbench.space import DisparitySpace, Volume, surface, visibility
-from matbench.statistics import Effect, intervals, paired_effect, paired_effects
-from matbench.volumes import StoredVolume
 
 
 def read(uri: str) -> NDArray[np.uint8]:

@@ -7,21 +7,22 @@ import cv2
 import numpy as np
 import pytest
 from attrs import evolve
+from places import METHODS
 
-from matbench import coloring, comparison, drawing, load_scene
+from matbench import comparison, load_scene
 from matbench.algorithm import Context
 from matbench.cli import main
 from matbench.errors import UserError
-from matbench.listening import RecordingProbe
-from matbench.recorded import Recording
+from matbench.plans.record_option import Recording
+from matbench.plans.settings import Settings
+from matbench.recording import coloring, drawing
+from matbench.recording.probe import RecordingProbe
 from matbench.reports import columns, maps, slices
+from matbench.runs.store import Store
 from matbench.scene import Range, Scene
-from matbench.settings import Settings
 from matbench.space import visibility
-from matbench.store import Store
 
 SMALL = "synthetic/box[size=96x72]"
-METHODS = Path(__file__).parent.parent / "methods.py"
 
 
 def matbench(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from matbench.ablation import COLUMNS
 from matbench.reports import switches
+from matbench.results.ablation import COLUMNS
 
 
 def table() -> pd.DataFrame:

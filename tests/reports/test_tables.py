@@ -8,7 +8,7 @@ import pytest
 from attrs import evolve
 from rich.console import Console
 
-from matbench.reports import tables
+from matbench.reports import tables, terminal
 from matbench.reports.content import Report
 
 GOOD, BROKEN = "good", "broken[x=[1] \"'&]"
@@ -101,7 +101,7 @@ def test_places_go_by_what_is_shown() -> None:
 @pytest.mark.parametrize("width", [80, 140])
 def test_terminal(report: Report, width: int) -> None:
     out = io.StringIO()
-    for table in tables.terminal(report.results, report.cells):
+    for table in terminal.tables(report.results, report.cells):
         Console(file=out, width=width).print(table)
     text = out.getvalue()
     assert max(map(len, text.splitlines())) <= width
@@ -111,9 +111,9 @@ def test_terminal(report: Report, width: int) -> None:
 
 
 def test_terminal_says_nothing_about_nothing(report: Report) -> None:
-    assert tables.terminal(report.results.iloc[:0], report.cells.iloc[:0]) == []
+    assert terminal.tables(report.results.iloc[:0], report.cells.iloc[:0]) == []
     empty = evolve(report, results=report.results.iloc[:0])
-    assert len(tables.terminal(empty.results, empty.cells)) == 2
+    assert len(terminal.tables(empty.results, empty.cells)) == 2
 
 
 def test_one_scene_in_many_guises_is_one_witness(report: Report) -> None:

@@ -5,7 +5,7 @@ import io
 import pandas as pd
 from rich.console import Console
 
-from matbench.reports import tables
+from matbench.reports import tables, terminal
 
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
 
@@ -27,7 +27,7 @@ def run_of(
 
 def printed(width: int, *args: object) -> str:
     console = Console(width=width, record=True, file=io.StringIO())
-    for table in tables.terminal(*args, width):  # type: ignore[arg-type]
+    for table in terminal.tables(*args, width):  # type: ignore[arg-type]
         console.print(table)
     return console.export_text()
 

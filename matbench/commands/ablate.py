@@ -1,0 +1,66 @@
+"""`matbench ablate`: what each switch of a method does, all else equal."""
+
+from pathlib import Path
+from typing import Annotated
+
+from attrs import evolve
+from cyclopts import App
+
+from matbench.commands.options import DEFAULTS, Options, check_metric, is_of_volumes, many, whole
+
+app = App(name="ablate", help_epilogue="", help_format="markdown")
+
+
+@app.default
+def ablate(
+    selector: str,
+    *,
+    scene: Annotated[
+        list[str] | None, many("-s", "--scene", "Scene or pattern, as for `compare`; the more, the better.")
+    ] = None,
+    options: Options = DEFAULTS,
+) -> int:
+    """Run every combination of a method's parameters and tell what each factor does.
+
+    Differences are paired by scene, all else equal; intervals and effect sizes are over scenes.
+    The first value of a parameter is the base that the others are compared with. Options of scenes may vary, too:
+    what takes three numbers or more gives curves.
+
+    **Examples**
+
+    `matbench ablate 'materiality[pairs=all,consecutive binarization=plane,volume]' -s 'middlebury*/*' --data DATA`
+
+    `matbench ablate algorithms/ablations/pairs.toml --data DATA`
+
+    `matbench ablate 'materiality[views=0]' -s 'middlebury*/*[views=2,3,5,7,9]' --data DATA`
+
+    Parameters
+    ----------
+    selector
+        Method with several values for its parameters, or a TOML file with `algorithms` and `scenes`.
+    """
+    from matbench import comparison
+    from matbench.commands import running
+    from matbench.plans.plan import methods
+    from matbench.results import ablation
+
+    check_metric(options.metric)
+    algorithms: list[str] = [selector]
+    if selector.endswith(".toml"):
+        algorithms, listed = comparison.read_request(Path(selector))
+        scene = scene or listed
+    chosen = methods(algorithms, options.plugin)
+    ablation.check_varies(chosen, scene or ())
+    ready = comparison.prepare(
+        algorithms,
+        scene,
+        settings=evolve(options.settings, volumes=is_of_volumes(options.metric)),
+        out=options.out,
+        seed=options.seeds,
+        plugin=options.plugin,
+        repeats=whole("repeats", options.repeats),
+        write=not options.dry_run,
+    )
+    if options.dry_run:
+        return running.show_plan(ready, options)
+    return running.work(ready, options, is_ablation=any(ablation.factors(chosen).values()))

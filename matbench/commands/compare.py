@@ -1,0 +1,108 @@
+"""`matbench compare`: run methods on scenes, score them, write tables and a report."""
+
+from typing import Annotated
+
+from attrs import evolve
+from cyclopts import App, Parameter
+
+from matbench.commands.options import DEFAULTS, Options, check_metric, is_of_volumes, many, whole
+from matbench.errors import UserError
+from matbench.plans.record_option import Recording
+
+app = App(name="compare", help_epilogue="", help_format="markdown")
+
+
+@app.default
+def compare(
+    *,
+    algorithm: Annotated[
+        list[str] | None,
+        many("-a", "--algorithm", "Method, such as `sgbm` or `materiality[pairs=all,consecutive]`; default all."),
+    ] = None,
+    scene: Annotated[
+        list[str] | None,
+        many(
+            "-s", "--scene", "Scene or pattern, such as `middlebury2003/teddy[views=0:9:2]`, `synthetic/*` or `paper`."
+        ),
+    ] = None,
+    record: Annotated[
+        list[str] | None,
+        Parameter(
+            consume_multiple=True,
+            negative="",
+            help="Also write a recording of every cell for `view`; default of all, "
+            "else of some of slices,volumes,space,surface,passes=N.",
+        ),
+    ] = None,
+    row: Annotated[
+        str | None,
+        Parameter(name=["--row", "--rows"], help="Image rows of the recordings' slices; default the middle one."),
+    ] = None,
+    volumes: Annotated[
+        bool, Parameter(negative="", help="Also keep and score the volumes of methods that have one.")
+    ] = False,
+    options: Options = DEFAULTS,
+) -> int:
+    """Run methods on scenes, score them, and write tables and a report.
+
+    Without arguments: all built-in methods on three synthetic scenes and on the paper's three where
+    the data folder has them. The same line typed again takes up where it was interrupted.
+
+    **Examples**
+
+    `matbench compare`
+
+    `matbench compare -a sgbm -a materiality -s middlebury2001/venus --data ~/stereo`
+
+    `matbench compare -a 'okutomi_kanade[window=3,5,7]' -s 'synthetic/*' -m bad_2`
+
+    An option of a scene, or a parameter, that takes three numbers or more gives curves. `views=N` is that many views
+    as wide as they fit, `baseline=N` how many view steps apart the outermost are:
+
+    `matbench compare -a okutomi_kanade -s 'middlebury2003/teddy[views=3 baseline=2,4,6]' --data DATA`
+
+    Recordings of chosen rows, or of chosen parts only:
+
+    `matbench compare -a materiality -s synthetic/box --record --rows 60,120,180`
+
+    `matbench compare -a materiality -s synthetic/box --record slices,passes=10`
+
+    Scores of volumes, which are kept; and of predictions of the rightmost view, which is not given:
+
+    `matbench compare -a materiality -s synthetic/box -m surface_f_1`
+
+    `matbench compare -s 'synthetic/*[predict=right]' -m prediction_psnr`
+
+    Four cells at once, none of them longer than ten minutes or larger than 2 GiB; on a Dask cluster:
+
+    `matbench compare --jobs 4 --timeout 600 --memory 2G`
+
+    `matbench compare --dask tcp://head:8786`
+
+    In a script, where the exit status tells 0 all well, 1 cells failed, 2 wrong usage, 130 interrupted:
+
+    `matbench compare -a sgbm -s synthetic/box --json`
+    """
+    from matbench import comparison
+    from matbench.commands import running
+
+    check_metric(options.metric)
+    if row is not None and record is None:
+        raise UserError(f"--row {row} chooses what recordings show: add --record")
+    if scene is None:
+        running.say_missing(comparison.default_scenes(options.data)[1], options)
+    ready = comparison.prepare(
+        algorithm,
+        scene,
+        settings=evolve(
+            options.settings,
+            record=None if record is None else Recording.of(record, row),
+            volumes=volumes or is_of_volumes(options.metric),
+        ),
+        out=options.out,
+        seed=options.seeds,
+        plugin=options.plugin,
+        repeats=whole("repeats", options.repeats),
+        write=not options.dry_run,
+    )
+    return running.show_plan(ready, options) if options.dry_run else running.work(ready, options)

@@ -1,0 +1,134 @@
+"""Options that several commands take."""
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+from attrs import field, frozen
+from cyclopts import Parameter
+
+from matbench.errors import UserError, unknown
+from matbench.plans import limits
+from matbench.plans.settings import Only, Settings
+
+Data = Annotated[
+    Path | None,
+    Parameter(name="--data", help="Folder of real scenes; else MATBENCH_DATA, else where `fetch` puts them."),
+]
+Plugins = Annotated[
+    list[Path],
+    Parameter(
+        name="--plugin", negative="", show_default=False, help="Python file with methods of your own; may be repeated."
+    ),
+]
+
+
+def many(short: str, long: str, text: str) -> Parameter:
+    return Parameter(name=[long, short], consume_multiple=True, negative="", help=text)
+
+
+@Parameter(name="*")
+@frozen
+class Options:
+    """What `compare` and `ablate` both take."""
+
+    data: Data = None
+    out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None
+    seed: Annotated[
+        list[str],
+        Parameter(
+            consume_multiple=True, negative="", show_default=False, help="Whole number, one or several; default 0."
+        ),
+    ] = field(factory=lambda: ["0"])
+    plugin: Plugins = field(factory=list)
+    metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1"
+    timeout: Annotated[
+        str, Parameter(help="Seconds that each cell may take, reading, warm-up and recording included; or none.")
+    ] = f"{limits.HOUR:g}"
+    memory: Annotated[
+        str | None, Parameter(help="Memory that each cell may hold, such as 4G; default a share of the machine's.")
+    ] = None
+    jobs: Annotated[str, Parameter(help="Cells that run at once. Their seconds are then marked as not comparable.")] = (
+        "1"
+    )
+    threads: Annotated[
+        str | None, Parameter(help="Threads that each method is given; default the cores, shared out to the jobs.")
+    ] = None
+    isolation: Annotated[
+        str, Parameter(help="process: one for each cell; shared: one for many, for methods that you trust.")
+    ] = "process"
+    dask: Annotated[
+        str | None,
+        Parameter(help="Dask scheduler that hands out the cells, tcp://HOST:PORT; or local: JOBS workers here."),
+    ] = None
+    only: Annotated[
+        Only | None,
+        Parameter(
+            help="`missing`: cells never computed, `failed`: those that did not end well, `all`: every cell again; "
+            "default what is not done."
+        ),
+    ] = None
+    repeats: Annotated[str, Parameter(help="Solve every cell so often: does a method repeat itself?")] = "1"
+    dry_run: Annotated[bool, Parameter(negative="", help="Only say what would run, and why.")] = False
+    quiet: Annotated[
+        bool,
+        Parameter(
+            name=["--quiet", "-q"],
+            negative="",
+            show_default=False,
+            help="Print nothing but the run folder, and what failed as errors.",
+        ),
+    ] = False
+    as_json: Annotated[
+        bool,
+        Parameter(
+            name="--json",
+            negative="",
+            show_default=False,
+            help="Print one JSON document at the end: folder, cells, table; progress goes to the error stream.",
+        ),
+    ] = False
+
+    @property
+    def settings(self) -> Settings:
+        """How to run, but for what is kept."""
+        return Settings(
+            self.data,
+            timeout=self.timeout,
+            memory=self.memory,
+            jobs=self.jobs,
+            threads=self.threads,
+            isolation=self.isolation,
+            dask=self.dask,
+            only=self.only,
+        )
+
+    @property
+    def seeds(self) -> list[int]:
+        return [whole("seed", one) for one in self.seed]
+
+
+DEFAULTS = Options()
+
+
+def whole(name: str, text: str) -> int:
+    """A number as typed; one that is not whole is refused, not rounded."""
+    if not re.fullmatch(r"[0-9]{1,9}", text):
+        raise UserError(f"{name} {text!r} is not a whole number from 0 to 999999999")
+    return int(text)
+
+
+def check_metric(metric: str) -> None:
+    """Raise UserError where no metric has that name."""
+    from matbench.results import scores
+
+    names = [m.name for m in scores.metrics()]
+    if metric not in names:
+        raise unknown("metric", metric, names)
+
+
+def is_of_volumes(metric: str) -> bool:
+    """Is this metric one of volumes, which are then kept?"""
+    from matbench.results import scores
+
+    return scores.of_volumes(metric)

@@ -1,0 +1,126 @@
+"""Prediction of an end view that the method was not given: a protocol that needs no ground truth.
+
+The reference view is carried into the withheld one by the estimated disparities; what comes out
+is compared with what the camera saw (Szeliski 1999, "Prediction error as a quality metric for
+motion and stereo"). As for answers, there are two numbers, never one: how good the prediction is
+where there is one, and how much of the view that is.
+"""
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from matbench.errors import unknown
+from matbench.measures.warping import carry, picture_columns
+from matbench.scene import HeldOut, NotInScene, Scene
+
+ENDS = ("left", "right")
+BEST = 100.0
+"""dB, given where there is no difference at all."""
+
+Differences = NDArray[np.float64]
+
+
+@frozen
+class PredictionMetric:
+    """A number for a predicted view.
+
+    Parameters
+    ----------
+    name, unit, better, about
+        As for `matbench.measures.metrics.Metric`.
+    compute
+        (pixels, 3) differences in grey levels, NaN where nothing is predicted -> the value; NaN
+        where it has none. It must not write to its argument.
+    """
+
+    name: str
+    unit: Literal["dB", "%"]
+    better: Literal["lower", "higher"]
+    about: str
+    compute: Callable[[Differences], float]
+
+
+def hold_out(scene: Scene, end: str) -> Scene:
+    """The scene without its leftmost or rightmost view, which becomes `Scene.held_out`.
+
+    Raises
+    ------
+    UserError
+        If `end` is neither ``left`` nor ``right``, that is the reference view, or fewer than two
+        views would be left.
+    """
+    if end not in ENDS:
+        raise unknown(f"view to predict of {scene.name}", end, ENDS)
+    index = 0 if end == "left" else scene.n - 1
+    if index == scene.ref:
+        label = scene.labels[index]
+        raise NotInScene(f"{scene.name}: the {end} view, {label}, is the reference view: choose another by ref=")
+    if scene.n < 3:
+        raise NotInScene(f"{scene.name}: {scene.n} views; at least three are needed to predict one of them")
+    rest = [view for view in range(scene.n) if view != index]
+    held_out = HeldOut(scene.labels[index], index - scene.ref, scene.views[index])
+    return evolve(scene.choose(rest), held_out=held_out)
+
+
+def predict(view: NDArray[np.uint8], disparity: NDArray[np.float32], steps: float) -> NDArray[np.float64]:
+    """What a view looks like from another one.
+
+    The disparities are carried there with a z-buffer (`carry`); each pixel that they reach takes
+    its colour from where it comes from, linear between pixels.
+
+    Parameters
+    ----------
+    view
+        (H, W, 3) uint8.
+    disparity
+        (H, W) float32 of that view, pixels per view step, NaN where unknown.
+    steps
+        View steps to the other view; negative if it is to the left.
+
+    Returns
+    -------
+    (H, W, 3) float64 grey levels; NaN where nothing is known.
+    """
+    there = carry(disparity, steps)
+    rows, columns = np.nonzero(np.isfinite(there))
+    place = np.clip(columns + steps * there[rows, columns], 0, view.shape[1] - 1)
+    left = np.minimum(place.astype(np.intp), view.shape[1] - 2)
+    share = (place - left)[:, None]
+    out = np.full(view.shape, np.nan)
+    out[rows, columns] = view[rows, left] * (1 - share) + view[rows, left + 1] * share
+    return out
+
+
+def differences(scene: Scene, disparity: NDArray[np.float32]) -> Differences:
+    """(pixels, 3) of the held-out view: predicted less seen, grey levels, NaN where nothing is predicted.
+
+    Its black borders are left out (`picture_columns`; 25 columns in the outermost views of Teddy).
+    """
+    assert scene.held_out is not None, "only for scenes that withhold a view"  # noqa: S101
+    there, image = predict(scene.views[scene.ref], disparity, scene.held_out.steps), scene.held_out.image
+    first, last = picture_columns(image)
+    return (there - image)[:, first : last + 1].reshape(-1, 3)
+
+
+def psnr(found: Differences) -> float:
+    """Peak signal-to-noise ratio, 10 log10(255² / mean square), dB, over predicted pixels; NaN if there are none."""
+    predicted = found[~np.isnan(found)]
+    if not predicted.size:
+        return float("nan")
+    square = float(np.mean(predicted**2))
+    return min(BEST, 10 * float(np.log10(255**2 / square))) if square else BEST
+
+
+def coverage(found: Differences) -> float:
+    """Per cent of the pixels that are predicted."""
+    return 100 * float((~np.isnan(found[:, 0])).mean())
+
+
+METRICS: tuple[PredictionMetric, ...] = (
+    PredictionMetric("prediction_psnr", "dB", "higher", "withheld view against its prediction, where one is", psnr),
+    PredictionMetric("prediction_coverage", "%", "higher", "pixels of the withheld view that are predicted", coverage),
+)

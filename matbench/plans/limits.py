@@ -1,0 +1,114 @@
+"""What a cell may take, as people write it: seconds, memory, cells at once, threads."""
+
+import os
+import re
+from contextlib import suppress
+from math import isfinite
+from pathlib import Path
+
+from matbench.errors import UserError
+
+HOUR = 3600.0
+_MOST = 256  # cells at once, or threads
+_UNITS = {"": 1, "m": 1, "g": 1024, "t": 1024 * 1024}
+
+
+def seconds(value: object) -> float | None:
+    """A time limit as given; ``none`` for none.
+
+    Raises
+    ------
+    UserError
+        If it is no positive number.
+    """
+    if value is None or value == "none":
+        return None
+    with suppress(TypeError, ValueError):
+        number = float(value)  # type: ignore[arg-type]
+        if isfinite(number) and number > 0 and not isinstance(value, bool):
+            return number
+    raise UserError(f"timeout {value!r} is not a positive number of seconds, such as 600, or none")
+
+
+def mebibytes(value: object) -> int | None:
+    """A memory limit in MiB, from a whole number of them or a text such as ``512M`` or ``1.5G``.
+
+    >>> mebibytes("1.5G")
+    1536
+
+    Raises
+    ------
+    UserError
+        If it is something else, or less than 1 MiB.
+    """
+    if value is None:
+        return None
+    found = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?) ?(?:([mgt])(?:i?b)?)?", str(value).lower())
+    amount = int(float(found.group(1)) * _UNITS[found.group(2) or ""]) if found else 0
+    if amount < 1:
+        raise UserError(f"memory {value!r} is not an amount such as 512 (MiB), 512M or 4G")
+    return amount
+
+
+def jobs(value: object) -> int:
+    """A number of cells at once.
+
+    Raises
+    ------
+    UserError
+        If it is no whole number from 1 to 256.
+    """
+    return _counted("jobs", value)
+
+
+def threads(value: object) -> int | None:
+    """A number of threads; None for a share of the cores.
+
+    Raises
+    ------
+    UserError
+        If it is no whole number from 1 to 256.
+    """
+    return None if value is None else _counted("threads", value)
+
+
+def _counted(name: str, value: object) -> int:
+    number = int(str(value)) if re.fullmatch(r"[0-9]{1,9}", str(value)) else 0
+    if not 1 <= number <= _MOST:
+        raise UserError(f"{name} {value!r} is not a whole number from 1 to {_MOST}")
+    return number
+
+
+def isolation(value: object) -> str:
+    """How processes are shared out to cells.
+
+    Raises
+    ------
+    UserError
+        If it is neither of the two words.
+    """
+    if value not in ("process", "shared"):
+        raise UserError(f"isolation {value!r} is not process or shared")
+    return str(value)
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def room() -> int:
+    """MiB that a run without a limit of its own may take: nine tenths of the machine's, or of its container's."""
+    import psutil
+
+    total = psutil.virtual_memory().total
+    with suppress(OSError, ValueError):
+        total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return int(total * 0.9) // (1 << 20)
+
+
+def crowded(at_once: int, threads_each: int) -> str:
+    """What is to be said where cells at once have more threads than there are cores; else nothing."""
+    if at_once * threads_each <= cores():
+        return ""
+    return f"{at_once} cells at once with {threads_each} threads each share {cores()} cores: they slow one another down"

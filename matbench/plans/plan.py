@@ -1,0 +1,158 @@
+"""What a run will do: the request, and its cells keyed by content."""
+
+import json
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from attrs import field, frozen
+
+from matbench import spec
+from matbench.errors import UserError
+from matbench.plans import plugins
+from matbench.scene import Scene
+
+SCHEMA = 2  # of cells and their keys; a change of what is stored makes all of them anew
+
+
+def digest(value: Any) -> str:
+    """Sixteen hexadecimal digits of SHA-256 over a value's canonical JSON."""
+    return sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:16]
+
+
+@frozen
+class Method:
+    """A method with one set of parameters.
+
+    Parameters
+    ----------
+    algorithm
+        Its name.
+    params
+        Every parameter with its value.
+    changed
+        Only those that differ from their defaults, as text: how tables tell methods apart.
+    code
+        SHA-256 of its code.
+    """
+
+    algorithm: str
+    params: Mapping[str, spec.Value]
+    changed: str = ""
+    code: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.algorithm}[{self.changed}]" if self.changed else self.algorithm
+
+
+@frozen
+class Cell:
+    """One method on one scene with one seed.
+
+    Parameters
+    ----------
+    key
+        Digest of everything that decides the answer; the name of the cell's folder.
+    repeat
+        0 is the cell that is scored; others solve the same again, to see whether the maps are the same.
+    """
+
+    method: Method
+    scene: str
+    scene_digest: str
+    seed: int
+    key: str
+    repeat: int = 0
+
+    @property
+    def question(self) -> tuple[str, str, str, int, int]:
+        """What is asked, whatever the code and the pixels: algorithm, parameters, scene, seed and repeat."""
+        params = json.dumps(dict(self.method.params), sort_keys=True)
+        return self.method.algorithm, params, self.scene, self.seed, self.repeat
+
+    def __str__(self) -> str:
+        seed = f", seed {self.seed}" if self.seed else ""
+        return f"{self.method} on {self.scene}{seed}" + (f", repeat {self.repeat}" if self.repeat else "")
+
+
+@frozen
+class Plan:
+    """All cells of a run, in order: scene by scene, so that partial results compare like with like.
+
+    Parameters
+    ----------
+    cells
+        What is to be computed.
+    plugin_files
+        The users' own files that hold methods.
+    spellings
+        Other names by which scenes were asked for -> what they are called in the cells.
+    """
+
+    cells: tuple[Cell, ...]
+    plugin_files: tuple[str, ...] = field(default=())
+    spellings: Mapping[str, str] = field(factory=dict)
+
+    @property
+    def scored(self) -> tuple[Cell, ...]:
+        """The cells that scores are computed from: no repeats."""
+        return tuple(cell for cell in self.cells if not cell.repeat)
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """What was asked for, without code and pixels: the same request resumes the same run."""
+        methods = {str(c.method): [c.method.algorithm, dict(c.method.params)] for c in self.cells}
+        return {
+            "algorithms": [methods[name] for name in sorted(methods)],
+            "scenes": sorted({c.scene for c in self.cells}),
+            "seeds": sorted({c.seed for c in self.cells}),
+            "plugins": sorted(self.plugin_files),
+        }
+
+    @property
+    def digest(self) -> str:
+        """Short digest of the request; it names the default run folder."""
+        return digest(self.request)[:8]
+
+
+def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[Method]:
+    """The methods that selectors mean, each once, parameters checked.
+
+    Raises
+    ------
+    UserError
+        For an unknown method or parameter, or a value that it does not take.
+    """
+    found: dict[str, Method] = {}
+    for one in spec.expand(selectors):
+        plugin = plugins.algorithm(one.name, files)
+        instance = spec.build(plugin.name, plugin.load(), one.options)
+        if not callable(getattr(instance, "solve", None)):
+            raise UserError(f"{plugin.name} from {plugin.source} is no method: it has no solve(scene, context)")
+        preset = one.options.get("preset") if "preset" not in spec.parameters(type(instance)) else None
+        changed = spec.text(spec.changed(instance, preset))
+        params = spec.values_of(instance)
+        method = Method(plugin.name, params, changed, plugins.method_digest(plugin, instance))
+        found.setdefault(spec.label(plugin.name, params), method)  # spelled in two ways, it is one method
+    return list(found.values())
+
+
+def make_plan(
+    chosen: Sequence[Method],
+    scenes: Mapping[str, Scene],
+    seeds: Sequence[int],
+    files: Sequence[Path] = (),
+    spellings: Mapping[str, str] | None = None,
+    repeats: int = 1,
+) -> Plan:
+    """Every method on every scene with every seed, solved `repeats` times."""
+    cells = []
+    for name, scene in scenes.items():
+        for method in chosen:
+            for seed in seeds:
+                facts = [SCHEMA, method.algorithm, dict(method.params), method.code, name, scene.digest, seed]
+                for repeat in range(repeats):
+                    key = digest([*facts, repeat] if repeat else facts)
+                    cells.append(Cell(method, name, scene.digest, seed, key, repeat))
+    return Plan(tuple(cells), tuple(str(path) for path in files), spellings or {})

@@ -1,0 +1,1 @@
+"""What the rerun viewer shows; imports the root's words, `measures` and `plans`."""

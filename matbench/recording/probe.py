@@ -1,0 +1,166 @@
+"""The probe that listens: a bounded part of what a method tells, kept for a recording or a figure."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from attrs import define, evolve, field, frozen
+from numpy.typing import NDArray
+
+from matbench.algorithm import Probe
+from matbench.plans.record_option import Recording
+from matbench.recording import drawing
+from matbench.recording.drawing import Reduced
+from matbench.space import Volume, visibility
+
+TOLD_VOLUMES = 12  # volumes that a method tells; later names are left out
+PASS_PIXELS = 200_000  # the map of a pass
+
+
+@frozen(eq=False)
+class Frame:
+    """What is kept of one pass: slices of materiality, of the derivative's sign, and the map."""
+
+    step: int
+    materiality: NDArray[np.uint8] | None
+    derivative: NDArray[np.int8] | None
+    disparity: NDArray[np.float32] | None
+
+
+@frozen(eq=False)
+class Colored:
+    """Up to three slices as red, green and blue.
+
+    Parameters
+    ----------
+    picture
+        (rows, planes, columns, 3) uint8; channels that stand for nothing are 0.
+    names
+        What red, green and blue stand for.
+    """
+
+    picture: NDArray[np.uint8]
+    names: tuple[str, ...]
+
+
+@define(eq=False)
+class RecordingProbe(Probe):
+    """Keeps a bounded part of what a method tells, copied: methods may reuse their arrays.
+
+    Energies are kept of every pass. Slices and maps are kept of at most so many passes as are
+    wanted, spread evenly, the first and the last among them: whenever there are too many, every
+    other one goes.
+
+    Parameters
+    ----------
+    wanted
+        What is listened to, with its rows.
+    latest
+        The slices of the similarity told last.
+    """
+
+    wanted: Recording
+    active: bool = True
+    volumes: dict[str, Reduced] = field(factory=dict)
+    similarities: dict[str, NDArray[np.uint8]] = field(factory=dict)
+    latest: Volume | None = None
+    energies: dict[str, list[tuple[int, float]]] = field(factory=dict)
+    _frames: list[Frame] = field(factory=list)
+    _last: Frame | None = None
+    _told: int = 0
+    _stride: int = 1
+
+    def volume(self, name: str, volume: Volume) -> None:
+        if self.wanted.slices and name.startswith("similarity/"):
+            self.latest = self.slices_of(volume)
+            self.similarities[name] = drawing.as_bytes(self.latest.values)
+        if self.wanted.volumes and (name in self.volumes or len(self.volumes) < TOLD_VOLUMES):
+            self.volumes[name] = drawing.reduced(volume, min(self.wanted.rows[0], volume.space.rows - 1))
+
+    def iteration(
+        self,
+        step: int,
+        energies: Mapping[str, float],
+        volume: Volume | None = None,
+        derivative: Volume | None = None,
+        disparity: NDArray[np.float32] | None = None,
+    ) -> None:
+        for name, value in energies.items():
+            self.energies.setdefault(name, []).append((step, float(value)))
+        if (volume is None and derivative is None and disparity is None) or not self.wanted.passes:
+            return
+        if not self.wanted.slices:
+            volume = derivative = None
+        self._last = Frame(
+            step,
+            None if volume is None else drawing.as_bytes(self.slices_of(volume).values),
+            None if derivative is None else np.sign(np.nan_to_num(self.slices_of(derivative).values)).astype(np.int8),
+            None if disparity is None else np.array(drawing.thinned(disparity, PASS_PIXELS), np.float32),
+        )
+        if self._told % self._stride == 0:
+            self._frames.append(self._last)
+            if len(self._frames) > self.wanted.passes:
+                self._frames = self._frames[::2]
+                self._stride *= 2
+        self._told += 1
+
+    @property
+    def frames(self) -> list[Frame]:
+        """At most so many passes as are wanted, the first and the last one told among them."""
+        if self._last is None or self._last is self._frames[-1]:
+            return list(self._frames)
+        return [*self._frames[: self.wanted.passes - 1], self._last]
+
+    def slices_of(self, volume: Volume) -> Volume:
+        """The epipolar planes that are shown, as a volume of so many rows."""
+        rows = [min(row, volume.space.rows - 1) for row in self.wanted.rows]
+        return Volume(evolve(volume.space, rows=len(rows)), volume.values[rows], volume.views)
+
+    def similarity(self, labels: Sequence[str]) -> Colored | None:
+        """Three pairs as red, green and blue, called by their views' labels.
+
+        Pairs of neighbouring views, if there are three: of more the first, the middle and the last.
+        Else the three whose views are least apart.
+        """
+        if not self.similarities:
+            return None
+        names = sorted(self.similarities, key=_apart)
+        shape = self.similarities[names[0]].shape
+        alike = [name for name in names if self.similarities[name].shape == shape]
+        near = [name for name in alike if _apart(name) == _apart(names[0])]
+        pool = near if len(near) >= 3 else alike[:3]
+        in_order = [name for name in self.similarities if name in pool]
+        chosen = [in_order[i] for i in sorted({0, len(pool) // 2, len(pool) - 1})]
+        return _colored([self.similarities[name] for name in chosen], [pair_label(name, labels) for name in chosen])
+
+    def visibility(self, volume: Volume, labels: Sequence[str]) -> Colored:
+        """How far the leftmost, the middle and the rightmost view of a volume see, as red, green and blue."""
+        here, last = self.slices_of(volume), len(volume.views) - 1
+        chosen = sorted({0, (last + 1) // 2, last})
+        seen = [drawing.as_bytes(visibility(here, view)) for view in chosen]
+        return _colored(seen, [labels[volume.views[view]] for view in chosen])
+
+
+def _colored(channels: Sequence[NDArray[np.uint8]], names: Sequence[str]) -> Colored:
+    picture = np.zeros((*channels[0].shape, 3), np.uint8)
+    for channel, values in enumerate(channels):
+        picture[..., channel] = values
+    return Colored(picture, tuple(names))
+
+
+def pair_of(name: str) -> tuple[int, int] | None:
+    """The views of a pair: (2, 3) for ``similarity/2-3``; None if the name does not say."""
+    first, _, second = name.removeprefix("similarity/").partition("-")
+    return (int(first), int(second)) if first.isdecimal() and second.isdecimal() else None
+
+
+def pair_label(name: str, labels: Sequence[str]) -> str:
+    """``similarity/2-3`` by the labels of its views, ``im2-im3``; else what stands after ``similarity/``."""
+    pair = pair_of(name)
+    if pair is None or max(pair) >= len(labels):
+        return name.removeprefix("similarity/")
+    return "-".join(labels[view] for view in pair)
+
+
+def _apart(name: str) -> int:
+    pair = pair_of(name)
+    return abs(pair[1] - pair[0]) if pair else 0

@@ -1,0 +1,125 @@
+"""Runs that lie on disk, taken up to be scored again: no method runs, no plug-in file is read."""
+
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from attrs import evolve, field, frozen
+
+from matbench.comparison import Comparison
+from matbench.errors import UserError
+from matbench.plans.plan import Cell, Method, Plan
+from matbench.plans.settings import Settings
+from matbench.results import archive
+from matbench.runs.store import Store
+from matbench.scene import Scene
+from matbench.scenes.catalogue import data_root, load_scene
+
+
+@frozen(eq=False)
+class Scenes:
+    """The scenes of a plan, as far as they are here and unchanged.
+
+    Parameters
+    ----------
+    found
+        Name -> scene.
+    missing
+        Name -> why it cannot be used, in words.
+    """
+
+    found: Mapping[str, Scene] = field(factory=dict)
+    missing: Mapping[str, str] = field(factory=dict)
+
+    @classmethod
+    def of(cls, plan: Plan, data: Path | None) -> "Scenes":
+        found, missing = {}, {}
+        for name, digest in {cell.scene: cell.scene_digest for cell in plan.cells}.items():
+            try:
+                scene = load_scene(name, data)
+            except UserError as error:
+                missing[name] = f"it is not here: {error}"
+                continue
+            if scene.digest == digest:
+                found[name] = scene
+            else:
+                missing[name] = "it is not the one that was solved: its pixels, views or range have changed"
+        return cls(found, missing)
+
+
+def open_run(
+    folder: Path, data: str | Path | None = None, partial: bool = False
+) -> tuple[Comparison, Mapping[str, str]]:
+    """A run as `matbench.comparison.prepare` gave it, from what is on disk; and the scenes that are left out, and why.
+
+    Parameters
+    ----------
+    partial
+        Leave out the scenes that are missing or have changed.
+
+    Raises
+    ------
+    UserError
+        If the folder holds no run, or scenes are missing and `partial` is not given.
+    """
+    store, root = Store(folder), data_root(data)
+    store.check_place()
+    plan = store.plan()
+    scenes = Scenes.of(plan, root)
+    if scenes.missing and not (partial and scenes.found):
+        said = "; ".join(f"{name}: {why}" for name, why in scenes.missing.items())
+        hint = "" if partial else "; --partial scores the other scenes"
+        raise UserError(f"{len(scenes.missing)} of {len(scenes.missing) + len(scenes.found)} scenes: {said}{hint}")
+    kept = tuple(cell for cell in plan.cells if cell.scene in scenes.found)
+    spellings = {name: of for name, of in plan.spellings.items() if of in scenes.found}
+    settings = Settings(data=root)
+    return Comparison(
+        evolve(plan, cells=kept, spellings=spellings), store, scenes.found, settings, store.command()
+    ), scenes.missing
+
+
+def join(folders: Sequence[Path], out: Path) -> Store:
+    """Make one run of several: every cell once, plan and cells in a new folder.
+
+    Raises
+    ------
+    UserError
+        If they do not belong into one table: a scene of one name has other pixels, a method of one
+        name other code, or the same cell other maps.
+    """
+    stores = [Store(folder) for folder in folders]
+    for store in stores:
+        store.check_place()
+    plans = [store.plan() for store in stores]
+    chosen: dict[str, tuple[Cell, Store]] = {}
+    scenes: dict[str, tuple[str, Store]] = {}
+    codes: dict[str, tuple[Method, Store]] = {}
+    for store, plan in zip(stores, plans, strict=True):
+        for cell in plan.cells:
+            digest, other = scenes.setdefault(cell.scene, (cell.scene_digest, store))
+            if digest != cell.scene_digest:
+                raise _unlike(cell.scene, "is another scene (pixels, views or range)", store, other)
+            method, other = codes.setdefault(str(cell.method), (cell.method, store))
+            if (method.code, method.params) != (cell.method.code, cell.method.params):
+                raise _unlike(str(cell.method), "has other code or parameters", store, other)
+            known, other = chosen.setdefault(cell.key, (cell, store))
+            mine, theirs = store.outcome(cell), other.outcome(known)
+            if mine and theirs and mine.maps != theirs.maps and {mine.status, theirs.status} == {"ok"}:
+                raise _unlike(str(cell), "has other maps, so that method does not repeat itself", store, other)
+            if mine and (theirs is None or theirs.status != "ok"):
+                chosen[cell.key] = cell, store
+    spellings = {name: of for plan in plans for name, of in plan.spellings.items()}
+    files = tuple(dict.fromkeys(file for plan in plans for file in plan.plugin_files))
+    joined = Store.open(
+        out, Plan(tuple(cell for cell, _ in chosen.values()), files, spellings), " + ".join(map(str, folders))
+    )
+    for cell, store in chosen.values():
+        if store.outcome(cell) is not None:
+            with joined.building(cell) as draft:
+                for path in archive.files_of(store, cell):
+                    shutil.copyfile(path, draft / path.name, follow_symlinks=False)
+    return joined
+
+
+def _unlike(name: str, what: str, one: Store, other: Store) -> UserError:
+    return UserError(f"{name} {what} in {str(one.folder)!r} than in {str(other.folder)!r}: one table cannot hold both")

@@ -1,0 +1,190 @@
+"""A run as one file that holds what is needed to check its tables, and nothing that could harm who opens it."""
+
+import json
+import re
+import stat
+import tempfile
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
+
+from matbench._version import __version__
+from matbench.errors import UserError
+from matbench.files import unzip
+from matbench.plans.plan import Cell
+from matbench.results import freshness
+from matbench.runs.lock import locked
+from matbench.runs.store import Store
+
+MANIFEST = "manifest.json"
+TOP = (
+    "plan.json",
+    "scores.json",
+    "results.csv",
+    "cells.csv",
+    "sweeps.csv",
+    "ablation.csv",
+    "ablation.tex",
+    "reliability.csv",
+    "report.html",
+)
+"""What may lie in a run folder besides the cells."""
+CELL = ("cell.json", "disparity.npz", "volume.npz", "log.txt")
+"""What is exported of a cell: no recordings, which are large and decide no score."""
+
+_NAME = re.compile(rf"({'|'.join(map(re.escape, TOP))})|cells/[0-9a-f]{{16}}/({'|'.join(map(re.escape, CELL))})")
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+_MOST = 1 << 26  # bytes of a manifest
+_CHUNK = 1 << 20
+
+
+def files_of(store: Store, cell: Cell) -> list[Path]:
+    """The files of a cell that decide its scores, or tell how it went; links are none of them."""
+    place = store.cell(cell)
+    return [] if place.is_symlink() else [path for name in CELL if _is_plain(path := place / name)]
+
+
+def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
+    """Write a run as one archive: the same bytes whenever and wherever the same run is exported.
+
+    Plan, tables, report, and of every cell of the plan its facts, maps, volume and log; what other
+    code or pixels left in the folder is not in it. ``manifest.json`` has the SHA-256 of each file.
+
+    Parameters
+    ----------
+    out
+        Where to; beside the folder if not given. An archive that lies there is replaced.
+
+    Returns
+    -------
+    Where it is, and how many cells of the plan are not done and so are not in it.
+
+    Raises
+    ------
+    UserError
+        If the folder holds no run, its tables are stale, or another process works on it.
+    """
+    store = Store(folder)
+    store.check_place()
+    plan = store.plan()
+    named = folder if folder.name else folder.resolve()
+    place = out or named.with_name(f"{named.name}.zip")
+    if place.exists() and not _is_archive(place):
+        raise UserError(f"{str(place)!r} is there already and is no exported run: name another file by --out")
+    with locked(folder):
+        if why := freshness.fault(plan, store):
+            raise UserError(f"the tables of {str(folder)!r} are stale, {why}: type matbench score {folder} first")
+        done = [cell for cell in plan.cells if store.outcome(cell) is not None]
+        paths = [path for name in TOP if _is_plain(path := folder / name)]
+        paths += [path for cell in done for path in files_of(store, cell)]
+        _write(place, folder, sorted(paths))
+    return place, len(plan.cells) - len(done)
+
+
+def unpack(path: Path, folder: Path) -> None:
+    """Take an exported run to pieces, into a new folder, and check every file by its digest.
+
+    Raises
+    ------
+    UserError
+        If it is no such archive, holds anything else, or a file is not what the manifest says.
+    """
+    try:
+        with unzip.opened(path) as archive:
+            members = _members(archive)
+            (folder / "cells").mkdir(parents=True)
+            manifest = _manifest(archive, members.pop(MANIFEST), folder)
+            if set(manifest) != set(members):
+                odd = sorted(set(manifest) ^ set(members))[0]
+                raise unzip.ArchiveError(f"{odd} stands only in the manifest, or is only in the archive")
+            for name, info in members.items():
+                target = folder / name
+                target.parent.mkdir(exist_ok=True)
+                unzip.unpack(archive, info, target, limit=info.file_size)
+                if _sha256(target) != manifest[name]:
+                    raise unzip.ArchiveError(f"{name} is not what it was when the run was exported")
+    except unzip.ArchiveError as error:
+        raise UserError(f"{str(path)!r} cannot be used: {error}") from error
+
+
+def _members(archive: ZipFile) -> dict[str, ZipInfo]:
+    """Name -> member of an archive in which nothing else lies than what `export` writes."""
+    names = [info.filename for info in archive.infolist()]
+    safe = {info.filename: info for info in unzip.members(archive, (MANIFEST, *TOP, *CELL))}
+    for name in names:
+        if name not in safe or not (name == MANIFEST or _NAME.fullmatch(name)):
+            raise unzip.ArchiveError(f"it holds {name!r}, which is no file of an exported run")
+    if len(set(names)) != len(names):
+        raise unzip.ArchiveError("it holds two files of one name")
+    if MANIFEST not in safe:
+        raise unzip.ArchiveError(f"it has no {MANIFEST}, so it is no exported run")
+    return safe
+
+
+def _manifest(archive: ZipFile, info: ZipInfo, folder: Path) -> dict[str, str]:
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        target = Path(place) / MANIFEST
+        unzip.unpack(archive, info, target, limit=_MOST)
+        try:
+            files = json.loads(target.read_text(encoding="utf-8"))["files"]
+            return {str(name): str(facts["sha256"]) for name, facts in files.items()}
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise unzip.ArchiveError(f"its {MANIFEST} is damaged") from error
+
+
+def _is_archive(path: Path) -> bool:
+    try:
+        with unzip.opened(path) as archive:
+            return MANIFEST in archive.namelist()
+    except unzip.ArchiveError:
+        return False
+
+
+def _is_plain(path: Path) -> bool:
+    """Is it a file, and no link to one elsewhere?"""
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except OSError:
+        return False
+
+
+def _write(place: Path, folder: Path, paths: list[Path]) -> None:
+    files = {p.relative_to(folder).as_posix(): {"sha256": _sha256(p), "bytes": p.stat().st_size} for p in paths}
+    manifest = json.dumps({"matbench": __version__, "files": files}, indent=1)
+    with tempfile.NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
+        draft = Path(file.name)
+        try:
+            with ZipFile(file, "w") as archive:
+                archive.writestr(_info(MANIFEST), manifest)
+                for path in paths:
+                    info = _info(path.relative_to(folder).as_posix())
+                    info.file_size = path.stat().st_size
+                    with archive.open(info, "w") as member:
+                        for chunk in _chunks(path):
+                            member.write(chunk)
+            draft.chmod(0o644)
+            draft.replace(place)
+        except BaseException:
+            draft.unlink(missing_ok=True)
+            raise
+
+
+def _info(name: str) -> ZipInfo:
+    info = ZipInfo(name, _EPOCH)
+    info.compress_type = ZIP_STORED if name.endswith(".npz") else ZIP_DEFLATED
+    info.create_system, info.external_attr = 3, (stat.S_IFREG | 0o644) << 16
+    return info
+
+
+def _chunks(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK):
+            yield chunk
+
+
+def _sha256(path: Path) -> str:
+    digest = sha256()
+    for chunk in _chunks(path):
+        digest.update(chunk)
+    return digest.hexdigest()

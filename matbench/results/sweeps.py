@@ -1,0 +1,264 @@
+"""Curves: error against an option of a scene, or a parameter of a method, that takes several numbers in one run.
+
+Within a sweep all else is equal. It is over the scenes in which every curve has every value, so
+that no point of a curve is a mean over easier scenes than another.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from math import isfinite, nan
+
+import numpy as np
+import pandas as pd
+from attrs import frozen
+
+from matbench import spec
+from matbench.measures.statistics import FEW, Effect, intervals
+from matbench.plans.plan import Method, Plan
+from matbench.spec import Spec
+
+LEAST_VALUES = 3
+"""Two values are a switch (`matbench.results.ablation`), not a curve."""
+
+REPEATS = ("ref", "seed")
+"""Options whose numbers are names: within a scene they are averaged over."""
+
+COLUMNS = (
+    "algorithm",
+    "params",
+    "value",
+    "region",
+    "metric",
+    "unit",
+    "mean",
+    "low",
+    "high",
+    "change",
+    "change_low",
+    "change_high",
+    "scenes",
+    "verdict",
+)
+
+
+@frozen(eq=False)
+class Sweep:
+    """One option's values and what they do.
+
+    Parameters
+    ----------
+    option
+        Its name.
+    of
+        The algorithm whose parameter it is; empty for an option of scenes.
+    setting
+        What the other options of scenes are that vary in the run, as they are typed.
+    values
+        At least `LEAST_VALUES`, increasing.
+    scenes
+        The scenes that means are over.
+    left_out
+        Scenes with these values that lack a result.
+    moving
+        Regions that hold other pixels at other values.
+    limits
+        Methods with a parameter of the same name as the scenes' option, less than the largest value.
+    curves
+        Columns `COLUMNS`. `params` are those that differ from their defaults, without the option
+        itself. `mean` over scenes with its interval, NaN below `FEW` scenes; `change` is the paired
+        difference from the first value, with its interval and verdict as in
+        `matbench.measures.statistics.Effect`. Scenes in which a region is empty do not count in it.
+    """
+
+    option: str
+    of: str
+    setting: str
+    values: tuple[float, ...]
+    scenes: tuple[str, ...]
+    left_out: tuple[str, ...]
+    moving: tuple[str, ...]
+    limits: Mapping[str, float]
+    curves: pd.DataFrame
+
+
+def is_swept(scenes: Iterable[Spec]) -> bool:
+    """Does an option of some scene or pattern take enough numbers for a curve?"""
+    values: dict[tuple[str, str], set[float]] = {}
+    for scene in scenes:
+        for option, text in scene.options.items():
+            if option not in REPEATS and isfinite(number := _number(text)):
+                values.setdefault((scene.name, option), set()).add(number)
+    return any(len(found) >= LEAST_VALUES for found in values.values())
+
+
+def table(sweeps: Sequence[Sweep]) -> pd.DataFrame:
+    """All curves in one table, ``sweeps.csv``: the columns of `Sweep` before those of its curves."""
+    parts = [
+        sweep.curves.assign(
+            option=sweep.option,
+            of=sweep.of,
+            setting=sweep.setting,
+            values=" ".join(f"{v:g}" for v in sweep.values),
+            over="; ".join(sweep.scenes),
+        )
+        for sweep in sweeps
+    ]
+    heads = ["option", "of", "setting", "values"]
+    whole = pd.concat(parts) if parts else pd.DataFrame(columns=[*heads, *COLUMNS, "over"])
+    return whole[[*heads, *COLUMNS, "over"]]
+
+
+def sweeps(plan: Plan, results: pd.DataFrame) -> list[Sweep]:
+    """Every sweep of a run.
+
+    Scenes with different values are compared in what they share: with 2, 3 and 5 views of one
+    scene and 2, 3, 5 and 7 of another there is a sweep of three values over both and one of four
+    over the other.
+
+    Parameters
+    ----------
+    results
+        ``results.csv`` of the plan.
+    """
+    cells = _cells(plan)
+    found = []
+    for option in dict.fromkeys(chain.from_iterable(cells["options"])):
+        if option not in REPEATS:
+            values = [_number(options.get(option)) for options in cells["options"]]
+            found += _sweeps_of(option, "", cells.assign(value=values, curve=cells["method"].map(str)), results)
+    for algorithm, mine in cells.groupby("algorithm", sort=False):
+        for option in mine["method"].iloc[0].params:
+            if option not in REPEATS:
+                values = [_number(method.params[option]) for method in mine["method"]]
+                curve = [spec.text({k: v for k, v in m.params.items() if k != option}) for m in mine["method"]]
+                found += _sweeps_of(option, str(algorithm), mine.assign(value=values, curve=curve), results)
+    return found
+
+
+def _number(value: object) -> float:
+    """The number that an option's text or a parameter's value is; NaN if it is none."""
+    return float(str(value)) if re.fullmatch(r"-?[0-9]{1,9}(\.[0-9]+)?(e-?[0-9]{1,2})?", str(value)) else nan
+
+
+def _cells(plan: Plan) -> pd.DataFrame:
+    """One row for each cell and each way in which its scene was asked for."""
+    spelled: dict[str, list[str]] = {cell.scene: [cell.scene] for cell in plan.cells}
+    for name, kept in plan.spellings.items():
+        spelled[kept].append(name)
+    rows = [
+        (c.method, c.method.algorithm, c.method.changed, c.scene, c.seed, one.name, one.options)
+        for c in plan.scored
+        for one in map(spec.read_scene, spelled[c.scene])
+    ]
+    columns = ["method", "algorithm", "params", "scene", "seed", "base", "options"]
+    return pd.DataFrame(rows, columns=columns).astype({"scene": object, "params": object, "base": object})
+
+
+def _varying(cells: pd.DataFrame) -> set[str]:
+    """The options of scenes that are not the same whenever a scene is asked for."""
+    found: set[str] = set()
+    for _, options in cells.groupby("base")["options"]:
+        names = set(chain.from_iterable(options))
+        found |= {name for name in names if len({one.get(name) for one in options}) > 1}
+    return found
+
+
+def _sweeps_of(option: str, of: str, cells: pd.DataFrame, results: pd.DataFrame) -> list[Sweep]:
+    """The sweeps of one option: `cells` have its `value` and the `curve` that they are on."""
+    varying = _varying(cells) - set(REPEATS)
+    rest = [{k: v for k, v in options.items() if of or k != option} for options in cells["options"]]
+    setting = [spec.text({k: v for k, v in one.items() if k in varying}) for one in rest]
+    fixed = [{k: v for k, v in one.items() if k not in varying and k not in REPEATS} for one in rest]
+    cells = cells.assign(
+        setting=setting,
+        base=[spec.label(base, one) for base, one in zip(cells["base"], fixed, strict=True)],
+        repeat=[
+            f"{spec.text({k: v for k, v in one.items() if k in REPEATS})} {seed}"
+            for one, seed in zip(rest, cells["seed"], strict=True)
+        ],
+    ).dropna(subset="value")
+    out = []
+    for name, part in cells.groupby("setting", sort=False):
+        asked = part.groupby(["curve", "base", "repeat"])["value"].agg(frozenset)
+        for values in sorted({v for v in asked if len(v) >= LEAST_VALUES}, key=lambda v: (-len(v), sorted(v))):
+            # a point is one curve on one scene in one repeat
+            points = asked.index[[values <= v for v in asked]]
+            keys = pd.MultiIndex.from_frame(part[["curve", "base", "repeat"]])
+            chosen = part[keys.isin(points) & part["value"].isin(values)]
+            out.append(_sweep(option, of, str(name), tuple(sorted(values)), chosen, results))
+    return out
+
+
+def _sweep(
+    option: str, of: str, setting: str, values: tuple[float, ...], cells: pd.DataFrame, results: pd.DataFrame
+) -> Sweep:
+    scored = results.assign(params=results["params"].fillna("")).rename(columns={"value": "score"})
+    joined = cells.merge(scored, on=["algorithm", "params", "scene", "seed"], how="left")
+    done = joined["metric"].notna().groupby(joined["base"], sort=False).all()
+    good = joined[joined["base"].map(done)]
+    methods = {str(row["curve"]): row["method"] for row in cells.drop_duplicates("curve").to_dict("records")}
+    return Sweep(
+        option,
+        of,
+        setting,
+        values,
+        tuple(str(scene) for scene in done.index[done]),
+        tuple(str(scene) for scene in done.index[~done]),
+        _moving(good),
+        {} if of else _limits(methods.values(), option, values[-1]),
+        _curves(good, {curve: (m.algorithm, _without(m, option if of else "")) for curve, m in methods.items()}),
+    )
+
+
+def _moving(good: pd.DataFrame) -> tuple[str, ...]:
+    """The regions that do not hold as many pixels at every value."""
+    counts = good.groupby(["region", "metric", "base", "repeat"], sort=False)["pixels"].nunique()
+    return tuple(dict.fromkeys(str(region) for region, *_ in counts.index[counts > 1]))
+
+
+def _limits(methods: Iterable[Method], option: str, largest: float) -> dict[str, float]:
+    """The methods whose own parameter of that name is set to less."""
+    own = {str(method): _number(method.params.get(option)) for method in methods}
+    return {name: limit for name, limit in own.items() if 0 < limit < largest}
+
+
+def _without(method: Method, option: str) -> str:
+    """What a method's label says of its other parameters."""
+    return " ".join(part for part in method.changed.split() if part.partition("=")[0] != option)
+
+
+def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
+    """The means of every curve and value over the scenes that have all of them."""
+    heads = ["region", "metric", "unit"]
+    groups = good.groupby([*heads, "curve", "value", "base"], sort=False)["score"]
+    per_scene = groups.mean().where(groups.count() == groups.size()).unstack("base").sort_index(level="value")
+    has = per_scene.notna().groupby(heads).transform("all")
+    rows: list[tuple[object, ...]] = []
+    for known in set(map(tuple, has.to_numpy().tolist())):  # at most a few: all at once is much faster
+        part = per_scene.loc[(has == list(known)).all(axis=1), list(known)]
+        if part.shape[1]:  # else the region is empty
+            for (*head, curve, value), line in zip(part.index, _lines(part), strict=True):
+                rows.append((*labels[str(curve)], value, *head, *line))
+    found = pd.DataFrame(rows, columns=list(COLUMNS))
+    places = {"algorithm": [a for a, _ in labels.values()], "params": [p for _, p in labels.values()]}
+    places |= {name: list(good[name].unique()) for name in ("region", "metric")}
+    order = [found[name].map(list(dict.fromkeys(places[name])).index) for name in places]
+    return found.iloc[np.lexsort([found["value"], *order[::-1]])].reset_index(drop=True)
+
+
+def _lines(scores: pd.DataFrame) -> list[tuple[object, ...]]:
+    """What `COLUMNS` say from `mean` on, for each row of curves by increasing values x scenes."""
+    numbers, count = scores.to_numpy(np.float64), scores.shape[1]
+    curves = scores.groupby(["region", "metric", "unit", "curve"], sort=False)
+    changes = numbers - curves.transform("first").to_numpy(np.float64)
+    nothing = np.full((2, 2 * len(scores)), nan)
+    low, high = intervals(np.concatenate([numbers, changes])) if count >= FEW else nothing
+    means, shifts = numbers.mean(axis=1), changes.mean(axis=1)
+    (low, least), (high, most) = np.split(low, 2), np.split(high, 2)
+    first = scores.index.get_level_values("value") == scores.index.get_level_values("value").min()
+    verdicts = [
+        "" if is_first else Effect(mean, lower, upper, nan, count).verdict
+        for is_first, mean, lower, upper in zip(first, shifts, least, most, strict=True)
+    ]
+    return list(zip(means, low, high, shifts, least, most, [count] * len(scores), verdicts, strict=True))

@@ -1,0 +1,79 @@
+"""Cells on their way from another machine: packed into bytes there, checked and put in place here."""
+
+import json
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from zipfile import ZIP_STORED, ZipFile
+
+from matbench.files.unzip import ArchiveError, members, opened, unpack
+from matbench.plans.plan import Cell
+from matbench.runs.store import Outcome, Store
+
+FILES = {
+    "cell.json": 1 << 26,
+    "log.txt": 1 << 20,
+    "disparity.npz": 1 << 31,
+    "volume.npz": 1 << 33,
+    "recording.rrd": 1 << 33,
+}
+"""What a cell may consist of -> the most bytes of it."""
+
+
+def pack(folder: Path) -> bytes:
+    """A cell's folder as a zip archive; its large files are compressed already."""
+    packed = BytesIO()
+    with ZipFile(packed, "w", ZIP_STORED) as archive:
+        for name in FILES:
+            if (folder / name).is_file():
+                archive.write(folder / name, name)
+    return packed.getvalue()
+
+
+def put(store: Store, cell: Cell, parcel: bytes) -> Outcome:
+    """Put a cell that came as an archive in its place, whole; one that comes twice replaces itself.
+
+    Raises
+    ------
+    ArchiveError
+        If what came is not this cell, or is damaged. The store is then as it was.
+    OSError
+        If it cannot be written.
+    """
+    with TemporaryDirectory(dir=store.folder / "cells", prefix=f".{cell.key}.") as folder:
+        beside = Store(Path(folder))
+        place = beside.cell(cell)
+        place.mkdir(parents=True)
+        _unpack(parcel, Path(folder) / "parcel.zip", place)
+        outcome = _outcome(beside, cell)
+        with store.building(cell) as draft:
+            for file in place.iterdir():
+                file.replace(draft / file.name)
+    return outcome
+
+
+def _unpack(parcel: bytes, file: Path, place: Path) -> None:
+    file.write_bytes(parcel)
+    with opened(file) as archive:
+        for info in members(archive, list(FILES)):
+            if info.filename not in FILES or (place / info.filename).exists():
+                raise ArchiveError(f"what came holds {info.filename!r}, which is no part of a cell")
+            unpack(archive, info, place / info.filename, FILES[info.filename])
+
+
+def _outcome(store: Store, cell: Cell) -> Outcome:
+    """The outcome of what claims to be a cell.
+
+    Raises
+    ------
+    ArchiveError
+        If it is another one, or none.
+    """
+    try:
+        key = json.loads((store.cell(cell) / "cell.json").read_text(encoding="utf-8"))["cell"]["key"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ArchiveError("what came is no cell") from error
+    outcome = store.outcome(cell)
+    if key != cell.key or outcome is None:
+        raise ArchiveError("what came is a damaged cell" if key == cell.key else "what came is another cell")
+    return outcome

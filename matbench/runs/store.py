@@ -1,0 +1,383 @@
+"""A run on disk: plan, cells and tables. A cell is there whole, or it is not there."""
+
+import json
+import os
+import re
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from errno import EISDIR, ELOOP, ENOENT, ENOTDIR, ENOTEMPTY
+from hashlib import sha256
+from math import isfinite
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from attrs import evolve, field, frozen
+from cattrs.preconf.json import make_converter
+from numpy.typing import NDArray
+
+from matbench.errors import UserError
+from matbench.files.writing import write_text
+from matbench.measures.volumes import StoredVolume
+from matbench.plans.plan import Cell, Plan
+from matbench.plans.record_option import Recording
+from matbench.runs import provenance
+from matbench.runs.lock import LOCK, WORK, locked
+
+Status = Literal["ok", "skipped", "failed", "timeout", "out-of-memory", "crashed", "interrupted"]
+FINAL: frozenset[Status] = frozenset({"ok", "skipped"})
+KEY = re.compile(r"[0-9a-f]{16}")
+"""What a cell's folder is called."""
+_DRAFT = re.compile(r"\.([0-9a-f]{16}|removed)\.\w+")
+_ABSENT = (ENOENT, ENOTDIR, EISDIR, ELOOP)
+_LONGEST = 2000  # characters of a reason
+_MAP_BYTES = 1 << 32  # of all maps of a cell, unpacked
+
+_json = make_converter()
+
+
+def _one_line(text: str) -> str:
+    """What a method, or whoever wrote a run folder, has to say, as one line that can be printed."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:_LONGEST].rstrip()
+
+
+@frozen
+class Outcome:
+    """What became of a cell.
+
+    Parameters
+    ----------
+    seconds
+        Wall time of the solve alone: no imports, no compilation, no recording.
+    warmup_seconds
+        Wall time of a first solve on a tiny scene of the same kind, compilation included.
+    peak_mb
+        Largest resident memory of the cell's process during the solve, in MiB.
+    reason
+        Why it is not `ok`, in one line.
+    has_volume
+        Did the estimate have a volume that could be kept? It is kept only on request.
+    work, history
+        As the estimate gave them; None for a number that is not finite.
+    recorded
+        What its recording holds, if it has one.
+    alone
+        Did no other cell of the run run meanwhile? Otherwise `seconds` is not comparable.
+    maps
+        Digest of its maps (`maps_digest`), if it has any.
+    ran_on
+        The machine and the versions that it ran on (`matbench.runs.provenance.ran_on`).
+    """
+
+    status: Status
+    seconds: float | None = None
+    warmup_seconds: float | None = None
+    peak_mb: float | None = None
+    threads: int | None = None
+    reason: str = field(default="", converter=_one_line)
+    has_volume: bool = False
+    work: Mapping[str, int] = {}
+    history: Mapping[str, list[float | None]] = {}
+    recorded: Recording | None = None
+    alone: bool = True
+    maps: str = ""
+    ran_on: Mapping[str, str] = {}
+
+
+class FolderLost(UserError):
+    """The run folder cannot be written or read any more: the disk is full, the network gone."""
+
+    @classmethod
+    def of(cls, folder: Path, error: OSError) -> "FolderLost":
+        why = error.strerror or str(error)
+        return cls(f"run folder {str(folder)!r} cannot be used: {why}. What is finished stays; mend this and go on")
+
+
+def maps_digest(maps: Mapping[int, NDArray[np.float32]]) -> str:
+    """Sixteen hexadecimal digits of SHA-256 over disparity maps: views, sizes and every bit of the values."""
+    digest = sha256()
+    for view, values in sorted(maps.items()):
+        digest.update(f"{view} {values.shape};".encode() + np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _to_disk(folder: Path) -> None:
+    """Have the system write a folder's files out: where it cannot, that is an error here and not later."""
+    for path in [*folder.iterdir(), folder]:
+        number = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)
+
+
+_TABLE_DRAFT = re.compile(
+    r"\.(plan|scores|work|results|cells|sweeps|ablation|reliability|report)\.(json|csv|tex|html)\.\w+"
+)
+
+
+def _is_ours(name: str) -> bool:
+    """May a folder that holds this, and no plan, become a run? A run that was killed at once leaves no more."""
+    return name == LOCK or name.startswith((WORK, ".plan.json."))
+
+
+@frozen
+class Store:
+    """One run folder."""
+
+    folder: Path
+
+    @classmethod
+    def open(cls, folder: Path, plan: Plan, command: str = "") -> "Store":
+        """Make a run folder for a plan, or take up the one that holds the same request.
+
+        Parameters
+        ----------
+        command
+            The line that asked for it.
+
+        Raises
+        ------
+        UserError
+            If the folder holds a different plan, or something that is no run, or another process works on it.
+        """
+        store = cls(folder)
+        try:
+            store.check(plan)
+            folder.mkdir(parents=True, exist_ok=True)
+            with locked(folder):
+                store.check(plan)
+                store.write_plan(plan, command)
+        except OSError as error:
+            raise UserError(f"output folder {str(folder)!r} cannot be used: {error.strerror}") from error
+        return store
+
+    def check(self, plan: Plan) -> None:
+        """Raise what `open` raises for a folder that cannot hold a plan; nothing is written."""
+        folder = self.folder
+        if folder.exists() and not folder.is_dir():
+            raise UserError(f"output {str(folder)!r} is a file: name a folder that is new or holds this run")
+        if (folder / "plan.json").exists():
+            if self.request() != plan.request:
+                raise UserError(f"output folder {str(folder)!r} holds a different plan: name another folder by --out")
+        elif folder.exists() and not all(_is_ours(path.name) for path in folder.iterdir()):
+            raise UserError(
+                f"output folder {str(folder)!r} is not empty and holds no run: name another folder by --out"
+            )
+        self.check_place()
+
+    def check_place(self) -> None:
+        """Raise UserError if the cells lie elsewhere: a link may not lead what is written, or removed, out."""
+        if (self.folder / "cells").is_symlink():
+            raise UserError(f"{self.folder / 'cells'} is a link: the cells of a run lie in its own folder")
+
+    def write_plan(self, plan: Plan, command: str = "") -> None:
+        """Write ``plan.json`` and make the place for cells, unless they are there."""
+        path = self.folder / "plan.json"
+        known = self._read(path).get("command", "") if path.exists() else ""
+        facts = {"request": plan.request, "command": command or known, **_json.unstructure(plan)}
+        text = json.dumps(facts, indent=1)
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            write_text(path, text)
+        (self.folder / "cells").mkdir(exist_ok=True)
+
+    def _read(self, path: Path) -> dict[str, Any]:
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise UserError(f"{path} cannot be read: {error.strerror}; give a run folder") from error
+        except (ValueError, RecursionError) as error:
+            raise UserError(f"{path} is damaged: not JSON") from error
+        if not isinstance(found, dict):
+            raise UserError(f"{path} is damaged: not a JSON object")
+        return found
+
+    def request(self) -> Any:
+        """What the run in this folder was asked for."""
+        return self._read(self.folder / "plan.json").get("request")
+
+    def command(self) -> str:
+        """The line that asked for the run, if it is known."""
+        return str(self._read(self.folder / "plan.json").get("command", ""))
+
+    def plan(self) -> Plan:
+        """The plan of the run in this folder."""
+        try:
+            plan = _json.structure(self._read(self.folder / "plan.json"), Plan)
+        except Exception as error:  # whatever cattrs raises for a hostile or damaged plan
+            if isinstance(error, UserError):
+                raise
+            raise UserError(f"{self.folder / 'plan.json'} is damaged: it is not a plan") from error
+        if not all(KEY.fullmatch(c.key) for c in plan.cells):
+            raise UserError(f"{self.folder / 'plan.json'} is damaged: a cell's key is not 16 hexadecimal digits")
+        if not all(str(c).isprintable() for c in plan.cells):
+            raise UserError(f"{self.folder / 'plan.json'} is damaged: a cell's name cannot be printed")
+        return plan
+
+    def cell(self, cell: Cell) -> Path:
+        """Where a cell's files lie once it is done."""
+        return self.folder / "cells" / cell.key
+
+    def outcome(self, cell: Cell, whole: bool = True) -> Outcome | None:
+        """What became of a cell, or None if it has not been computed, or its files are damaged.
+
+        Parameters
+        ----------
+        whole
+            Read its maps, too, and see whether they are what was stored.
+
+        Raises
+        ------
+        FolderLost
+            If the folder cannot be read: nobody knows what is in it.
+        """
+        try:
+            facts = json.loads((self.cell(cell) / "cell.json").read_text(encoding="utf-8"))
+            outcome = _json.structure(facts["outcome"], Outcome)
+            numbers = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb)
+            if not all(isfinite(number) for number in numbers if number is not None):
+                return None
+            if whole and outcome.status == "ok":
+                maps = self.disparity(cell)
+                if outcome.maps and maps_digest(maps) != outcome.maps:
+                    return None
+        except Exception as error:  # half a cell is no cell: it is computed anew
+            if isinstance(error, OSError) and error.errno is not None and error.errno not in _ABSENT:
+                raise FolderLost.of(self.folder, error) from error
+            return None
+        return outcome
+
+    def stale(self, plan: Plan) -> list[Cell]:
+        """The stored cells that are none of the plan's: of other code, other pixels, other repeats."""
+        current = {cell.key for cell in plan.cells}
+        found = []
+        for path in sorted((self.folder / "cells").glob("*/cell.json")):
+            if path.parent.name in current or not KEY.fullmatch(path.parent.name):
+                continue
+            try:
+                cell = _json.structure(json.loads(path.read_text(encoding="utf-8"))["cell"], Cell)
+            except Exception:  # whatever a damaged one raises  # noqa: S112
+                continue
+            if cell.key == path.parent.name:
+                found.append(cell)
+        return found
+
+    @contextmanager
+    def building(self, cell: Cell) -> Iterator[Path]:
+        """A folder beside a cell's place, moved there when the block ends, removed if it fails."""
+        draft = Path(tempfile.mkdtemp(prefix=f".{cell.key}.", dir=self.folder / "cells"))
+        try:
+            yield draft
+            _to_disk(draft)
+            draft.chmod(0o755)
+            self._place(draft, cell)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+
+    def _place(self, draft: Path, cell: Cell) -> None:
+        for attempt in range(3):
+            if os.path.lexists(self.cell(cell)):
+                self.remove(cell)
+            try:
+                draft.replace(self.cell(cell))
+            except OSError as error:  # somebody else's came in between
+                if error.errno != ENOTEMPTY or attempt == 2:
+                    raise
+            else:
+                return
+
+    def remove(self, cell: Cell) -> None:
+        """Take a cell away, in one step: aside first, then to pieces."""
+        aside = Path(tempfile.mkdtemp(prefix=".removed.", dir=self.folder / "cells"))
+        with suppress(FileNotFoundError):
+            self.cell(cell).replace(aside / cell.key)
+        shutil.rmtree(aside, ignore_errors=True)
+
+    def try_out(self) -> None:
+        """Raise FolderLost if a cell could not be kept: see whether a mebibyte can be written."""
+        try:
+            with tempfile.TemporaryFile(dir=self.folder / "cells") as file:
+                file.write(os.urandom(1 << 20))
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise FolderLost.of(self.folder, error) from error
+
+    def recording(self, part: str | None = None) -> Path:
+        """The recording of the one cell whose name or key contains `part`.
+
+        Raises
+        ------
+        UserError
+            If none has one, or several have.
+        """
+        paths = {str(c): self.cell(c) / "recording.rrd" for c in self.plan().cells}
+        recorded = {name: path for name, path in paths.items() if path.exists()}
+        if not recorded:
+            raise UserError(f"run {str(self.folder)!r} has no recordings: type its compare command again with --record")
+        hits = [name for name, path in recorded.items() if part is None or part in name or part in path.parent.name]
+        exact = [name for name in hits if name == part]
+        if len(exact or hits) != 1:
+            which = f"{len(hits)} recordings match {part!r}" if part else f"there are {len(hits)} recordings"
+            raise UserError(f"{which}: name one of {', '.join(map(repr, hits or recorded))}")
+        return recorded[(exact or hits)[0]]
+
+    def sweep(self) -> None:
+        """Remove what runs that were killed left beside the cells, and half-written tables."""
+        self.check_place()
+        for draft in (self.folder / "cells").glob(".*"):
+            if _DRAFT.fullmatch(draft.name):
+                shutil.rmtree(draft, ignore_errors=True)
+        for draft in self.folder.glob(".*.*.*"):
+            if _TABLE_DRAFT.fullmatch(draft.name):
+                with suppress(OSError):
+                    draft.unlink()
+
+    def disparity(self, cell: Cell) -> dict[int, NDArray[np.float32]]:
+        """View index -> (H, W) stored disparity map, pixels per view step.
+
+        Raises
+        ------
+        ValueError, OSError
+            If the file is missing or holds something else.
+        """
+        path = self.cell(cell) / "disparity.npz"
+        with path.open("rb") as file:
+            with zipfile.ZipFile(file) as archive:
+                if sum(info.file_size for info in archive.infolist()) > _MAP_BYTES:
+                    raise ValueError(f"{path} unpacks to more than {_MAP_BYTES} bytes")
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as arrays:
+                maps = {int(name.removeprefix("view_")): arrays[name] for name in arrays.files}
+        if not maps or any(values.ndim != 2 or values.dtype != np.float32 for values in maps.values()):
+            raise ValueError(f"{path} holds no disparity maps")
+        return maps
+
+    def volume(self, cell: Cell) -> StoredVolume | None:
+        """The stored volume, or None where there is none, or a damaged one."""
+        try:
+            return StoredVolume.read(self.cell(cell) / "volume.npz")
+        except (ValueError, OSError):
+            return None
+
+
+def write_cell(
+    draft: Path,
+    cell: Cell,
+    outcome: Outcome,
+    disparity: Mapping[int, NDArray[np.float32]] | None = None,
+    volume: StoredVolume | None = None,
+) -> None:
+    """Fill a cell's folder: its facts and, where it has them, its maps and its volume."""
+    if volume is not None:
+        volume.write(draft / "volume.npz")
+    if disparity is not None:
+        arrays: dict[str, Any] = {f"view_{view}": values for view, values in disparity.items()}
+        np.savez_compressed(draft / "disparity.npz", **arrays)
+    outcome = evolve(outcome, maps=maps_digest(disparity) if disparity else "", ran_on=provenance.ran_on())
+    facts = {"cell": _json.unstructure(cell), "outcome": _json.unstructure(outcome)}
+    text = json.dumps(facts, indent=1, allow_nan=False)
+    (draft / "cell.json").write_text(text, encoding="utf-8")

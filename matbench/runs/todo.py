@@ -1,0 +1,72 @@
+"""What of a plan is left to do, and why."""
+
+from collections.abc import Iterator
+
+from matbench.plans.plan import Cell, Plan
+from matbench.plans.settings import Settings
+from matbench.runs.store import FINAL, Outcome, Store
+
+
+def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
+    """The cells that a run computes: by default those without a final outcome, or without what was asked for besides.
+
+    That is a recording that holds what is asked for, and the volume of a method that has one.
+    `Settings.only` takes fewer, or all.
+    """
+    return [cell for cell, _ in _pending(plan, store, settings)]
+
+
+def explained(plan: Plan, store: Store, settings: Settings) -> list[tuple[Cell, str]]:
+    """`pending`, with the reason for each, in words."""
+    before: dict[tuple[str, str, str, int, int], list[Cell]] = {}
+    for old in store.stale(plan):
+        before.setdefault(old.question, []).append(old)
+    out = []
+    for cell, outcome in _pending(plan, store, settings):
+        why = _reason(cell, outcome, store, settings)
+        if outcome is None and cell.question in before:
+            why = _changed(cell, before[cell.question])
+        out.append((cell, why))
+    return out
+
+
+def _pending(plan: Plan, store: Store, settings: Settings) -> Iterator[tuple[Cell, Outcome | None]]:
+    for cell in plan.cells:
+        outcome = store.outcome(cell)
+        is_failed = outcome is not None and outcome.status not in FINAL
+        is_missing = not is_failed and bool(_lacks(cell, outcome, store, settings))
+        due = {"all": True, "failed": is_failed, "missing": is_missing, None: is_failed or is_missing}
+        if due[settings.only]:
+            yield cell, outcome
+
+
+def _lacks(cell: Cell, outcome: Outcome | None, store: Store, settings: Settings) -> str:
+    """What is not there of what was asked for; empty if all is."""
+    if outcome is None:
+        return "its files are damaged" if store.cell(cell).exists() else "not computed yet"
+    if cell.repeat:
+        return ""
+    if settings.volumes and outcome.has_volume and store.volume(cell) is None:
+        return "its volume was not kept"
+    if settings.record is None or outcome.status != "ok":
+        return ""
+    if outcome.recorded is None or not (store.cell(cell) / "recording.rrd").exists():
+        return "it has no recording"
+    return "" if outcome.recorded.covers(settings.record) else "its recording holds less"
+
+
+def _reason(cell: Cell, outcome: Outcome | None, store: Store, settings: Settings) -> str:
+    if outcome is not None and outcome.status not in FINAL:
+        return f"{outcome.status}: {outcome.reason}" if outcome.reason else outcome.status
+    return _lacks(cell, outcome, store, settings) or "asked for again"
+
+
+def _changed(cell: Cell, before: list[Cell]) -> str:
+    """Why what was computed before does not count any more."""
+    if any(old.scene_digest == cell.scene_digest and old.method.code == cell.method.code for old in before):
+        return "stored by another version of matbench"
+    if any(old.scene_digest == cell.scene_digest for old in before):
+        return "code changed"
+    if any(old.method.code == cell.method.code for old in before):
+        return "scene changed"
+    return "code and scene changed"

@@ -1,0 +1,230 @@
+"""Finding and loading scenes by name."""
+
+import os
+import re
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from glob import glob
+from pathlib import Path
+
+from attrs import evolve, frozen
+
+from matbench.errors import UserError, unknown
+from matbench.plans import plugins
+from matbench.scene import Scene
+from matbench.scenes.dataset import Dataset, Listing
+from matbench.spec import Spec, expand, label, parse
+
+DATA_VARIABLE = "MATBENCH_DATA"
+PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
+GROUPS = {"paper": PAPER_SCENES}
+"""What a selector may name instead of a pattern."""
+
+_NO_TRUTH = "no ground truth"
+
+
+def user_root() -> Path:
+    """This person's own folder of real scenes, where `matbench fetch` puts them; it may not exist yet."""
+    import platformdirs
+
+    return platformdirs.user_data_path("matbench", appauthor=False)
+
+
+OWN = "folder"
+"""The dataset that loads a scene from the folder of a path; every name that is a path is its."""
+
+
+def data_root(data: str | Path | None = None) -> Path | None:
+    """The folder of real scenes: `data`, else what MATBENCH_DATA names, else `user_root` if it exists.
+
+    Raises
+    ------
+    UserError
+        If it is named but is no folder.
+    """
+    named = data or os.environ.get(DATA_VARIABLE) or None
+    if named is None:
+        own = user_root()
+        return own.resolve() if own.is_dir() else None
+    root = Path(named).expanduser()
+    if not root.is_dir():
+        by = "--data" if data else DATA_VARIABLE
+        raise UserError(f"data folder {str(root)!r} ({by}) does not exist: name the folder that holds middlebury/")
+    return root.resolve()
+
+
+def own_folder(name: str) -> str | None:
+    """The folder that a scene's name means, as it is always written; None if it names no folder.
+
+    A path begins with ``/``, ``.`` or ``~``, or is one that exists and no DATASET/SCENE; written as
+    ``folder/PATH`` it is a path in any case. A relative path is written as ``./PATH`` or ``../PATH``.
+    """
+    prefix, _, rest = name.partition("/")
+    if prefix == OWN and rest:
+        name = rest
+    elif not name.startswith(("/", ".", "~")) and (prefix in plugins.installed("datasets") or not os.path.isdir(name)):  # noqa: PTH112
+        return None
+    path = os.path.normpath(os.path.expanduser(name))  # noqa: PTH111 (as text: what is typed stays recognizable)
+    return path if path.startswith((os.sep, "..")) else os.path.join(".", path)  # noqa: PTH118
+
+
+def _folders(pattern: str) -> list[str]:
+    """The folders that a pattern of paths matches."""
+    found = glob(own_folder(pattern) or pattern)  # noqa: PTH207
+    return [path for path in sorted(found) if os.path.isdir(path)]  # noqa: PTH112
+
+
+def _dataset(prefix: str) -> Dataset:
+    known = plugins.installed("datasets")
+    if prefix not in known:
+        raise unknown("dataset", prefix, known)
+    loaded: Dataset = known[prefix].load()
+    return loaded
+
+
+def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
+    """Every known scene by its full name; a dataset that cannot be imported by its error."""
+    root = data_root(data)
+    found: dict[str, Listing | UserError] = {}
+    for prefix, plugin in plugins.installed("datasets").items():
+        try:
+            found |= {f"{prefix}/{listing.name}": listing for listing in plugin.load().listings(root)}
+        except UserError as error:
+            found[prefix] = error
+        except Exception as error:  # a plug-in's own failure harms no other
+            found[prefix] = UserError(f"dataset {prefix!r} from {plugin.source}: {type(error).__name__}: {error}")
+    return found
+
+
+@frozen
+class Selection:
+    """Names of scenes, and why -> which others a pattern means but cannot have."""
+
+    names: tuple[str, ...]
+    left_out: Mapping[str, Sequence[str]] = {}
+
+
+def is_pattern(name: str) -> bool:
+    """Does a name stand for all scenes that it matches, or for a group such as ``paper``?"""
+    return name in GROUPS or re.search(r"[*?]", name) is not None
+
+
+def group(name: str, known: Iterable[str]) -> list[str]:
+    """The names that a pattern, or a name of several scenes such as ``paper``, means."""
+    if name in GROUPS:
+        return [one for one in GROUPS[name] if one in set(known)]
+    return [one for one in known if fnmatchcase(one, name)]
+
+
+def select(selectors: str | Iterable[str], data: str | Path | None = None, needs_truth: bool = True) -> Selection:
+    """The scenes that selectors mean; patterns match scenes that are present and have truth.
+
+    A pattern with a size takes the scenes that are present in it, one with ``predict`` also those
+    without truth.
+
+    Parameters
+    ----------
+    needs_truth
+        Are they to be scored? To be looked at, scenes need no truth.
+
+    Raises
+    ------
+    UserError
+        For a malformed selector, or a pattern that matches no scene present.
+    """
+    names: dict[str, None] = {}
+    left_out: dict[str, list[str]] = {}
+    known: dict[str, Listing | UserError] | None = None
+    for spec in expand(selectors):
+        if not is_pattern(spec.name):
+            names[str(spec)] = None
+            continue
+        known = known if known is not None else listings(data)
+        hits = group(spec.name, known)
+        if not hits and (folders := _folders(spec.name)):
+            names |= {str(Spec(folder, spec.options)): None for folder in folders}
+            continue
+        offered = {name: found for name in hits if isinstance(found := known[name], Listing)}
+        present = {name: found for name, found in offered.items() if found.present or found.complete}
+        why = {name: _unfit(found, spec.options, needs_truth) for name, found in present.items()}
+        fit = [name for name, reason in why.items() if not reason]
+        if not fit:
+            raise _no_match(spec, hits, why)
+        for name, reason in why.items():
+            if reason and name not in left_out.setdefault(reason, []):
+                left_out[reason].append(name)
+        names |= {str(Spec(name, spec.options)): None for name in fit}
+    return Selection(tuple(names), left_out)
+
+
+def _unfit(listing: Listing, options: Mapping[str, str], needs_truth: bool) -> str:
+    """Why a scene cannot be had with those options; empty if it can."""
+    size = options.get("size")
+    if needs_truth and not listing.truth and "predict" not in options:
+        return _NO_TRUTH
+    if size is None or listing.complete is None:
+        return "" if listing.present else "not complete"
+    if size not in listing.sizes:
+        return f"no size {size}"
+    return "" if size in listing.complete else f"not there in size {size}"
+
+
+def _no_match(spec: Spec, hits: Sequence[str], unfit: Mapping[str, str]) -> UserError:
+    """The error for a pattern that means no scene that can be compared; `unfit` says why of those present."""
+    if not hits:
+        return UserError(f"no scene {spec.name!r} exists: see 'matbench list'")
+    which = f"{len(hits)} scenes that {spec.name!r} matches"
+    if unfit:
+        which += f": none can be compared ({', '.join(f'{name}: {reason}' for name, reason in unfit.items())})"
+        if set(unfit.values()) == {_NO_TRUTH}:
+            return UserError(f"{which}: see 'matbench list'")
+    else:
+        which += " are known but not under the data folder"
+    advice = f"give the data folder by --data or {DATA_VARIABLE}"
+    if any(hasattr(_dataset(hit.partition("/")[0]), "downloads") for hit in hits):
+        size = {key: value for key, value in spec.options.items() if key == "size"}
+        advice += f", or bring them with {shlex.join(['matbench', 'fetch', str(Spec(spec.name, size))])}"
+    return UserError(f"{which}: {advice}")
+
+
+def load_scene(name: str, data: str | Path | None = None) -> Scene:
+    """Load a scene, such as ``middlebury2003/teddy[views=0:9:2]``.
+
+    Parameters
+    ----------
+    name
+        ``dataset/scene`` or the path of a folder, options in brackets; one value for each. Besides its
+        dataset's own, every scene has ``predict=left`` and ``predict=right``: that end view is held out.
+    data
+        The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
+
+    Raises
+    ------
+    UserError
+        If the name or an option is unknown, or its files are missing or damaged.
+    """
+    specs = parse(name)
+    if len(specs) != 1:
+        raise UserError(f"{name!r} names {len(specs)} scenes: give one value for each option")
+    options = dict(specs[0].options)
+    end = options.pop("predict", None)
+    scene = _load(specs[0].name, options, data)
+    if end is None:
+        return scene
+    from matbench.measures.prediction import hold_out
+
+    full = parse(scene.name)[0]
+    return evolve(hold_out(scene, end), name=label(full.name, dict(sorted({**full.options, "predict": end}.items()))))
+
+
+def _load(name: str, options: Mapping[str, str], data: str | Path | None) -> Scene:
+    """From the dataset that the name without its options says."""
+    if (folder := own_folder(name)) is not None:
+        return _dataset(OWN).load(folder, options, None)
+    prefix, slash, rest = name.partition("/")
+    if not slash or not rest:
+        raise UserError(
+            f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box', or a path, ./{name}"
+        )
+    return _dataset(prefix).load(rest, options, data_root(data))

@@ -1,0 +1,128 @@
+"""Where scenes come from: what a dataset plug-in offers."""
+
+import shlex
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Protocol
+
+from attrs import frozen
+
+from matbench.scene import Scene
+
+
+@frozen
+class Listing:
+    """One scene as `matbench list` shows it.
+
+    Parameters
+    ----------
+    name
+        Without the dataset's prefix: ``teddy``.
+    views
+        How many views it has.
+    sizes
+        Option value -> (width, height) in pixels; the default size first.
+    present
+        Can it be loaded now, in its default size?
+    complete
+        The sizes in which it can be loaded now, where a dataset tells them apart.
+    truth
+        Is there ground truth, so that it can be scored?
+    """
+
+    name: str
+    views: int
+    sizes: Mapping[str, tuple[int, int]]
+    present: bool
+    complete: Collection[str] | None = None
+    truth: bool = True
+
+
+@frozen
+class Remote:
+    """A file that can be downloaded.
+
+    Parameters
+    ----------
+    name
+        What it is called, without folder.
+    bytes, sha256
+        Its size and digest.
+    also
+        Other names under which the same content may lie, such as ``im0.png`` for ``im0.ppm``.
+    offered_as
+        Further names under which it may be offered; it is then renamed, its suffix kept.
+    holds
+        Does a file of other bytes hold the same content, such as the same pixels?
+    """
+
+    name: str
+    bytes: int
+    sha256: str
+    also: tuple[str, ...] = ()
+    offered_as: tuple[str, ...] = ()
+    holds: Callable[[Path], bool] = lambda _: False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (self.name, *self.also)
+
+
+@frozen
+class Download:
+    """Where the files of one scene in one size can be had, and where they go.
+
+    Parameters
+    ----------
+    name
+        Of the scene, dataset and size included: ``middlebury2003/teddy[size=half]``.
+    folder
+        Where the files go, below the data root.
+    site
+        URL that `sources` start from, ending in a slash; a mirror takes its place.
+    sources
+        Zip archives with all or some of the files, and folders of single files (these end in a
+        slash), the best first.
+    """
+
+    name: str
+    folder: PurePosixPath
+    files: tuple[Remote, ...]
+    site: str
+    sources: tuple[str, ...]
+
+    @property
+    def command(self) -> str:
+        """What brings it, as it is typed."""
+        return shlex.join(["matbench", "fetch", self.name])
+
+
+class Dataset(Protocol):
+    """A family of scenes under one prefix: the name of its entry point, such as ``middlebury2003``.
+
+    One whose scenes can be downloaded also has ``downloads() -> Mapping[str, Mapping[str, Download]]``:
+    scene without prefix -> size, the default first -> its files; `matbench fetch` then brings them.
+    """
+
+    def listings(self, root: Path | None) -> Sequence[Listing]:
+        """All scenes that it knows, whether they are under `root` or not."""
+        ...
+
+    def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:
+        """Load one scene, its `regions` filled in.
+
+        Parameters
+        ----------
+        name
+            Without the prefix.
+        options
+            What stood in brackets: ``{"views": "0:9:2", "size": "half"}``.
+        root
+            The folder of real scenes (`matbench.scenes.catalogue.data_root`), if there is one.
+
+        Raises
+        ------
+        UserError
+            For an unknown name, option or value, and for missing or damaged files.
+        """
+        ...

@@ -1,0 +1,228 @@
+"""Is a scene what it says it is? Its images and its ground truth, asked; the answers in words."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from matbench.measures.warping import picture_columns
+from matbench.scene import Scene
+from matbench.scenes import alignment
+from matbench.scenes.alignment import Matches
+from matbench.scenes.photo_consistency import WarpingError, together, warping_errors
+
+Verdict = Literal["good", "note", "problem", "unknown"]
+
+NOTED_ROWS, WRONG_ROWS = 0.5, 1.0  # px of vertical misalignment
+NOTED_STEP, WRONG_STEP = 0.12, 0.3  # of a view step, from the view's place
+IN_RANGE = 0.9  # share of matched features that the range must hold
+KNOWN_IN_RANGE = 0.98  # share of the truth
+LEAST_SEEN = 0.1  # share of the truth's points that the other views see, together
+NOTED_SHIFT = 0.5  # px of the pair, from where the truth explains the views best
+CLEARLY = 0.9  # of the warping error: a rival that leaves less explains the views better
+_CLEAR_SHARE = 0.3  # by which one direction must hold more features than the other
+_TRIAL_PIXELS = 200_000  # rivals of the truth are tried on every k-th row
+
+
+@frozen
+class Finding:
+    """One thing that was looked at.
+
+    Parameters
+    ----------
+    topic
+        In a word or two.
+    verdict
+        ``unknown``: it could not be measured.
+    text
+        What was found, and if it is a problem, what to do.
+    """
+
+    topic: str
+    verdict: Verdict
+    text: str
+
+
+def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Finding]:
+    """Look at a scene's order of views, direction of shift, rows and truth, one after the other.
+
+    Parameters
+    ----------
+    names
+        What to call the views in the answers, such as the names of their files; by default their
+        labels.
+    """
+    called = list(names or scene.labels)
+    matches = alignment.match(scene.views, scene.ref)
+    places = alignment.places(matches, scene.n, scene.ref)
+    steps = (np.arange(scene.n) - scene.ref).astype(np.float64) if places is None else places
+    found = alignment.disparities(matches, steps)
+    if places is not None and not _follow(places) and _inside(scene, -found) > _inside(scene, found) + _CLEAR_SHARE:
+        places, found = -places, -found  # no order at all has no direction either: that of the range
+    yield _order(scene, called, places)
+    yield _direction(scene, found)
+    yield _rows(matches, called)
+    yield from _borders(scene, called)
+    if not scene.truth:
+        yield Finding(
+            "truth", "note", "there is none: a comparison needs [predict=left] or [predict=right] after the scene"
+        )
+    for view in sorted(scene.truth):
+        yield from _truth(evolve(scene, ref=view, regions={}), called[view])
+
+
+def _list(names: Sequence[str]) -> str:
+    return ", ".join(names)
+
+
+def _follow(places: NDArray[np.float64]) -> bool:
+    """Do the views lie from one side to the other?"""
+    return bool((np.diff(places[np.isfinite(places)]) > 0).all())
+
+
+def _inside(scene: Scene, disparities: NDArray[np.float64]) -> float:
+    """The share of disparities that the scene's range holds, with a margin."""
+    least, largest = scene.disparities.least, scene.disparities.largest
+    margin = max(0.5, 0.05 * (largest - least))
+    held = (disparities >= least - margin) & (disparities <= largest + margin)
+    return float(np.mean(held)) if len(held) else 0.0
+
+
+def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | None) -> Finding:
+    if scene.n == 2:
+        return Finding("order", "good", "two views: their order is what the direction of the shift shows")
+    if places is None or np.isfinite(places).sum() < 3:
+        return Finding("order", "unknown", "too few features are found again in other views to tell their order")
+    known = [view for view in range(scene.n) if np.isfinite(places[view])]
+    if not _follow(places):
+        order = sorted(known, key=lambda view: places[view])
+        return Finding(
+            "order", "problem", f"the views do not follow one another: list {_list([names[v] for v in order])}"
+        )
+    away = np.abs(places - (np.arange(scene.n) - scene.ref))
+    worst = int(np.nanargmax(away))
+    text = f"view {names[worst]} was taken {places[worst] - places[scene.ref]:.2f} steps from {names[scene.ref]}"
+    if away[worst] > WRONG_STEP:
+        return Finding("order", "problem", f"views are not evenly spaced: {text}, not {worst - scene.ref}")
+    if away[worst] > NOTED_STEP:
+        return Finding("order", "note", f"views are not quite evenly spaced: {text}, not {worst - scene.ref}")
+    left = _list([names[view] for view in range(scene.n) if view not in known])
+    unsure = f"; too few features in {left}" if left else ""
+    return Finding("order", "good", f"from one side to the other, within {away[worst]:.2f} of a step{unsure}")
+
+
+def _direction(scene: Scene, found: NDArray[np.float64]) -> Finding:
+    if len(found) < alignment.ENOUGH:
+        return Finding("shift", "unknown", "too few features are found again in other views to tell their disparities")
+    inside, mirrored = _inside(scene, found), _inside(scene, -found)
+    low, high = np.quantile(found, (0.02, 0.98))
+    measured = f"features have {low:.1f} .. {high:.1f} px per view step"
+    if inside >= IN_RANGE:
+        unsure = "; the range holds either direction, so that only truth can tell it" if mirrored >= IN_RANGE else ""
+        return Finding("shift", "good", f"{measured}, the range is {scene.disparities}{unsure}")
+    if mirrored >= max(IN_RANGE, inside + _CLEAR_SHARE):
+        return Finding(
+            "shift",
+            "problem",
+            f"points move the wrong way: {measured}, the range is {scene.disparities}. Views must be listed from left "
+            "to right, so that nearer points move left from one view to the next: list them the other way round",
+        )
+    share = f"{100 * (1 - inside):.0f} %"
+    return Finding("shift", "problem", f"{share} of them lie outside the range {scene.disparities}: {measured}")
+
+
+def _rows(matches: Mapping[int, Matches], names: Sequence[str]) -> Finding:
+    found = {view: rows for view, moved in matches.items() if (rows := alignment.rows(moved)) is not None}
+    if not found:
+        return Finding("rows", "unknown", "too few features are found again in other views to tell their rows")
+    worst = max(found, key=lambda view: found[view].worst)
+    rows = found[worst]
+    if rows.worst <= NOTED_ROWS:
+        return Finding("rows", "good", f"level within {rows.worst:.2f} px")
+    side = "lower" if rows.offset > 0 else "higher"
+    text = f"view {names[worst]} lies {abs(rows.offset):.2f} px {side} than the reference view"
+    turned = ", and is turned or scaled" if rows.worst > 2 * abs(rows.offset) + NOTED_ROWS else ""
+    text += f"{turned}: up to {rows.worst:.2f} px between rows"
+    wrong = rows.worst > WRONG_ROWS
+    return Finding("rows", "problem" if wrong else "note", text + ("; rectify the views first" if wrong else ""))
+
+
+def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
+    lost = {}
+    for name, view in zip(names, scene.views, strict=True):
+        first, last = picture_columns(view)
+        lost[name] = scene.width - 1 - last + first
+    black = ", ".join(f"{name} ({count})" for name, count in lost.items() if count)
+    if black:
+        yield Finding("borders", "note", f"views end in black columns, which match nothing: {black}")
+
+
+def _truth(scene: Scene, name: str) -> Iterator[Finding]:
+    topic = f"truth of {name}"
+    truth = scene.truth[scene.ref]
+    known = truth[np.isfinite(truth)]
+    margin = 0.5 / scene.pair_steps
+    held = np.mean((known >= scene.disparities.least - margin) & (known <= scene.disparities.largest + margin))
+    if held < KNOWN_IN_RANGE:
+        ends = f"{known.min():g} .. {known.max():g}"
+        text = (
+            f"{100 * (1 - held):.0f} % of it lies outside the range {scene.disparities}: it is {ends} px per view step"
+        )
+        yield Finding(topic, "problem", text)
+    error = together(warping_errors(scene))
+    if error is None or error.pixels < LEAST_SEEN * (scene.n - 1) * known.size:
+        yield Finding(topic, "problem", "it leads out of the other views nearly everywhere: is its scale right?")
+        return
+    at = error.mean
+    said = f"warped views differ by {at[1]:.2f} grey levels, {at[0]:.2f} and {at[2]:.2f} with it 1 px of the pair off"
+    rival = _better(scene)
+    if rival is not None:
+        yield Finding(topic, "problem", f"{said}. The views are explained better {rival}")
+    elif at[1] >= min(at[0], at[2]):
+        way = "smaller" if at[0] < at[2] else "larger"
+        yield Finding(topic, "problem", f"{said}: {way} disparities explain the views better")
+    else:
+        best = _vertex(error)
+        text = f"; {best:+.1f} px would explain them best" if abs(best) > NOTED_SHIFT else ""
+        yield Finding(topic, "note" if text else "good", said + text)
+
+
+def _vertex(error: WarpingError) -> float:
+    """The shift of least error, by a parabola through the three; px of the pair."""
+    less, zero, more = error.mean
+    return (less - more) / (2 * (less + more - 2 * zero))
+
+
+def _better(scene: Scene) -> str | None:
+    """What explains the views clearly better than the truth as it is, in words; None if nothing does."""
+    truth = scene.truth[scene.ref]
+    flat = np.where(np.isfinite(truth), np.nanmedian(truth), np.nan).astype(np.float32)
+    pair, two = np.float32(scene.pair_steps), np.float32(2)
+    rivals: dict[str, Callable[[], NDArray[np.float32]]] = {
+        "with its sign reversed: nearer must be larger, and views listed from left to right": lambda: -truth,
+        "with it turned upside down: rows of a PFM file go from bottom to top": lambda: truth[::-1],
+        "with it mirrored": lambda: truth[:, ::-1],
+        "with half of it: is its scale right?": lambda: truth / two,
+        "with twice of it: is its scale right?": lambda: truth * two,
+        "with one disparity for all pixels: it is not the truth of these images": lambda: flat,
+    }
+    if scene.pair_steps != 1:
+        rivals[f"with it divided by {pair:g}, the steps of the pair: truth is per view step"] = lambda: truth / pair
+    step = max(1, -(-truth.size // _TRIAL_PIXELS))
+    thin = evolve(
+        scene,
+        views=scene.views[:, ::step],
+        truth={scene.ref: truth[::step]},
+        visible={view: seen[:, ::step] for view, seen in scene.visible.items()},
+    )
+
+    def left(disparity: NDArray[np.float32]) -> float:
+        error = together(warping_errors(thin, np.ascontiguousarray(disparity[::step]), (0.0,)))
+        return np.inf if error is None else error.mean[0]
+
+    own = left(truth)
+    trials = {words: left(rival()) for words, rival in rivals.items()}
+    best = min(trials, key=lambda words: trials[words])
+    return best if trials[best] < CLEARLY * own else None
