@@ -138,7 +138,7 @@ number = broken_package.odd:number
 hint = broken_package.odd:Hint
 [matbench.datasets]
 odd = broken_package.odd:number
-[matbench.measures.metrics]
+[matbench.metrics]
 missing = broken_package.odd:missing
 odd = broken_package.odd:number
 failing = broken_package.odd:failing

@@ -482,7 +482,7 @@ def test_what_changes_decides_what_is_done_again(tmp_path: Path, monkeypatch: py
     site = tmp_path / "site"  # a package with a metric, as if it were installed
     (site / "extra-1.0.dist-info").mkdir(parents=True)
     (site / "extra-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: extra\nVersion: 1.0\n")
-    (site / "extra-1.0.dist-info" / "entry_points.txt").write_text("[matbench.measures.metrics]\nmean = extra:METRIC\n")
+    (site / "extra-1.0.dist-info" / "entry_points.txt").write_text("[matbench.metrics]\nmean = extra:METRIC\n")
     monkeypatch.syspath_prepend(site)
     run = tmp_path / "run"
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from places import METHODS, UNRULY
+from places import METHODS, TESTS, UNRULY
 
 from matbench.cli import main
 from matbench.plans.plan import methods
