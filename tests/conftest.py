@@ -15,7 +15,7 @@ import pytest
 from machines import Machines
 
 from matbench.plans.plugins import kernel_cache
-from matbench.solving import method_check
+from matbench.solving import check_scenes
 
 if TYPE_CHECKING:
     from following import Desk
@@ -62,14 +62,14 @@ def machines(tmp_path: Path) -> Iterator[Machines]:
 
 
 @pytest.fixture(scope="module")
-def smaller() -> Iterator[dict[str, method_check.Trial]]:
+def smaller() -> Iterator[dict[str, check_scenes.Trial]]:
     """What `check` tries, on scenes of two thirds the size."""
     with pytest.MonkeyPatch.context() as patch:
         for name in ("EASY", "EITHER_SIGN"):
-            patch.setattr(method_check, name, getattr(method_check, name).replace("]", " size=160x120]"))
-        method_check.trials.cache_clear()
-        yield dict(method_check.trials())
-    method_check.trials.cache_clear()
+            patch.setattr(check_scenes, name, getattr(check_scenes, name).replace("]", " size=160x120]"))
+        check_scenes.trials.cache_clear()
+        yield dict(check_scenes.trials())
+    check_scenes.trials.cache_clear()
 
 
 class Site:

@@ -20,6 +20,7 @@ from matbench.plans import limits, plugins
 from matbench.plans.plan import Method
 from matbench.plans.plan import methods as chosen
 from matbench.solving import method_check
+from matbench.solving.check_verdicts import CheckResult
 
 app = App(
     name="check",
@@ -62,7 +63,7 @@ def check(
     patience = limits.seconds(timeout) or math.inf
     ready, files = _read(method, plugin)
     console = Console()
-    results: list[tuple[Method, list[method_check.Finding]]] = []
+    results: list[tuple[Method, list[CheckResult]]] = []
     columns = (BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     shown = console.is_terminal and not as_json
     for one in ready:
@@ -98,20 +99,20 @@ def _read(names: Sequence[str], plugin: Sequence[Path]) -> tuple[list[Method], l
     return chosen(selectors, list(dict.fromkeys(files))), list(dict.fromkeys(files))
 
 
-def _passes(found: Sequence[method_check.Finding]) -> bool:
+def _passes(found: Sequence[CheckResult]) -> bool:
     """No check fails, and not everything was skipped."""
     verdicts = [finding.verdict for finding in found if finding.check != "quiet"]
     return "fail" not in verdicts and "pass" in verdicts
 
 
-def _summary(method: Method, found: Sequence[method_check.Finding]) -> str:
+def _summary(method: Method, found: Sequence[CheckResult]) -> str:
     failed = [finding.check for finding in found if finding.verdict == "fail"]
     if failed:
         return f"{method} fails: {', '.join(failed)}"
     return f"{method} passes" if _passes(found) else f"{method}: nothing could be tried"
 
 
-def _table(method: Method, found: Sequence[method_check.Finding]) -> Table:
+def _table(method: Method, found: Sequence[CheckResult]) -> Table:
     table = Table(
         Column("check", no_wrap=True), Column("", no_wrap=True), "what is asked", "what was found",
         title=escape(str(method)), title_justify="left",

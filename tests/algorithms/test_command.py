@@ -19,7 +19,8 @@ from matbench.comparison import default_algorithms, prepare
 from matbench.errors import UserError
 from matbench.plans.plan import methods
 from matbench.scenes.catalogue import load_scene
-from matbench.solving.method_check import check, mirrored
+from matbench.solving.check_scenes import mirrored
+from matbench.solving.method_check import check
 
 MATCHER = (PROGRAMS / "block_matcher.py").read_text()
 START = """

@@ -3,7 +3,7 @@
 import pytest
 from following import Desk, lines, shortened, words
 
-from matbench.solving.method_check import Trial
+from matbench.solving.check_scenes import Trial
 
 
 @pytest.mark.parametrize("line", lines("check"), ids=str)

@@ -18,8 +18,9 @@ from matbench.cli import main
 from matbench.plans.plan import methods
 from matbench.scene import Scene
 from matbench.scenes.catalogue import load_scene
-from matbench.solving import method_check
-from matbench.solving.method_check import Finding, mirrored
+from matbench.solving import check_scenes, check_solve, check_verdicts, method_check
+from matbench.solving.check_scenes import mirrored
+from matbench.solving.check_verdicts import CheckResult
 
 BUILT_IN = [
     "materiality",
@@ -32,11 +33,11 @@ BUILT_IN = [
 ]
 
 
-def verdicts(found: list[Finding]) -> dict[str, str]:
+def verdicts(found: list[CheckResult]) -> dict[str, str]:
     return {finding.check: finding.verdict for finding in found}
 
 
-def failed(found: list[Finding]) -> set[str]:
+def failed(found: list[CheckResult]) -> set[str]:
     return {finding.check for finding in found if finding.verdict == "fail"}
 
 
@@ -61,7 +62,7 @@ def unlike(scene: Scene, sign: int = 1) -> float:
     return float(np.median(np.concatenate(gaps)))
 
 
-@pytest.mark.parametrize("name", [method_check.EASY, method_check.EITHER_SIGN])
+@pytest.mark.parametrize("name", [check_scenes.EASY, check_scenes.EITHER_SIGN])
 def test_in_a_mirror_exact_truth_still_explains_all_views(name: str) -> None:
     scene = load_scene(name)
     other = mirrored(scene)
@@ -77,10 +78,10 @@ def test_in_a_mirror_exact_truth_still_explains_all_views(name: str) -> None:
 
 
 @pytest.mark.parametrize("selector", BUILT_IN)
-def test_built_in_methods_keep_to_it(selector: str, smaller: dict[str, method_check.Trial], tmp_path: Path) -> None:
+def test_built_in_methods_keep_to_it(selector: str, smaller: dict[str, check_scenes.Trial], tmp_path: Path) -> None:
     (method,) = methods(selector)
-    answers = {name: method_check.solve(method, (), trial, tmp_path / "log") for name, trial in smaller.items()}
-    found = method_check.judge(answers)
+    answers = {name: check_solve.solve_here(method, (), trial, tmp_path / "log") for name, trial in smaller.items()}
+    found = check_verdicts.judge(answers)
     assert set(verdicts(found).values()) == {"pass"}, found
 
 

@@ -1,0 +1,87 @@
+"""The small scenes on which `matbench check` tries a method."""
+
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from matbench.scene import Range, Scene
+from matbench.scenes.catalogue import load_scene
+from matbench.solving.worker import hide_truth
+
+EASY, EITHER_SIGN = "synthetic/box[n=5 ref=1]", "synthetic/curved[n=5 ref=1]"
+"""Textured scenes of 240x180 px. The reference view is not in the middle: the field's pair has only one
+side there, and so has any choice of views, so that no method has to toss a coin that its mirror image
+would toss the other way."""
+
+
+@frozen(eq=False)
+class Trial:
+    """One solve: a scene (by its parts, as a process is handed them), seed and threads."""
+
+    name: str
+    views: NDArray[np.uint8]
+    ref: int
+    disparities: Range
+    pair_steps: float
+    threads: int = 1
+
+    @classmethod
+    def of(cls, name: str, scene: Scene, threads: int = 1) -> "Trial":
+        return cls(name, scene.views, scene.ref, scene.disparities, scene.pair_steps, threads)
+
+    @property
+    def scene(self) -> Scene:
+        labels = tuple(str(view) for view in range(len(self.views)))
+        return Scene(self.name, self.views, labels, self.ref, self.disparities, {}, self.pair_steps)
+
+
+def mirrored(scene: Scene) -> Scene:
+    """The scene as it is seen in a mirror: columns and the order of the views reversed.
+
+    With x' = W - 1 - x and j' = n - 1 - j, x_j = x_ref - (j - ref) d becomes
+    x'_j' = x'_ref' - (j' - ref') d: disparities keep their sign, maps are reversed along their rows.
+    """
+    last = scene.n - 1
+    return evolve(
+        scene,
+        views=scene.views[::-1, :, ::-1],
+        labels=scene.labels[::-1],
+        ref=last - scene.ref,
+        truth={last - view: truth[:, ::-1] for view, truth in scene.truth.items()},
+        regions={name: mask[:, ::-1] for name, mask in scene.regions.items()},
+        visible={last - view: seen[::-1, :, ::-1] for view, seen in scene.visible.items()},
+        held_out=scene.held_out
+        and evolve(scene.held_out, image=scene.held_out.image[:, ::-1], steps=-scene.held_out.steps),
+    )
+
+
+def _small(shape: tuple[int, int], disparities: Range, value: int | None = None) -> Scene:
+    """Three views without any truth: random colours, or one grey everywhere."""
+    size = (3, *shape, 3)
+    pixels = np.random.default_rng(1).integers(0, 256, size) if value is None else np.full(size, value)
+    return Scene("small", pixels.astype(np.uint8), ("0", "1", "2"), 1, disparities, {}, 1)
+
+
+@cache
+def trials() -> Mapping[str, Trial]:
+    """Every scene that is tried, by name."""
+    easy, either = (hide_truth(load_scene(name)) for name in (EASY, EITHER_SIGN))
+    scenes = {
+        "easy": easy,
+        "easy again": easy,
+        "easy mirrored": mirrored(easy),
+        "either sign": either,
+        "either sign mirrored": mirrored(either),
+        "two views": easy.choose((1, 3)),
+        "three views": easy.choose((0, 1, 2)),
+        "1x1 px": _small((1, 1), Range(0, 5)),
+        "one row": _small((1, 40), Range(-2, 5)),
+        "one column": _small((30, 1), Range(0, 5)),
+        "narrower than the range": _small((12, 5), Range(0, 12)),
+        "constant": _small((24, 48), Range(0, 8), value=128),
+    }
+    found = {name: Trial.of(name, scene) for name, scene in scenes.items()}
+    return {**found, "easy, 3 threads": Trial.of("easy", easy, threads=3)}

@@ -1,0 +1,177 @@
+"""One solve of `matbench check`: in a process of its own, which a second one watches and clears away."""
+
+import os
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from hashlib import sha256
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+
+import numpy as np
+from attrs import evolve, field, frozen
+from numpy.typing import NDArray
+
+from matbench import spec
+from matbench.algorithm import Context
+from matbench.measures.volumes import StoredVolume
+from matbench.plans import limits, plugins
+from matbench.plans.plan import Method
+from matbench.solving import processes
+from matbench.solving.check_scenes import Trial
+from matbench.solving.worker import checked
+from matbench.spec import first_line
+
+HARNESS = Path(__file__).parents[1]
+_TICK = 0.05  # seconds between two looks at a process
+
+
+@frozen(eq=False)
+class Answer:
+    """What became of one solve; without maps there is either a `reason` or an `error`.
+
+    Parameters
+    ----------
+    maps
+        View -> (H, W) float32 as the harness keeps them.
+    digest
+        SHA-256 of the estimate: maps, volume, work.
+    infinite
+        How many pixels of the maps were infinite.
+    touched
+        Was the scene changed?
+    reason
+        Why the method does not support the scene.
+    error
+        What went wrong, in a line.
+    output
+        What the method printed.
+    """
+
+    maps: Mapping[int, NDArray[np.float32]] = field(factory=dict)
+    digest: str = ""
+    infinite: int = 0
+    touched: bool = False
+    reason: str = ""
+    error: str = ""
+    output: str = ""
+
+
+@contextmanager
+def _printing_to(path: Path) -> Iterator[None]:
+    """Send all that this process prints, from Python or from C, to a file."""
+    with path.open("w", encoding="utf-8", errors="replace", buffering=1) as log:
+        kept = os.dup(1), os.dup(2)
+        os.dup2(log.fileno(), 1)
+        os.dup2(log.fileno(), 2)
+        try:
+            with redirect_stdout(log), redirect_stderr(log):
+                yield
+        finally:
+            for saved, number in zip(kept, (1, 2), strict=True):
+                os.dup2(saved, number)
+                os.close(saved)
+
+
+def solve_here(method: Method, files: Sequence[Path], trial: Trial, log: Path) -> Answer:
+    """Solve one trial in this process; what the method raises is told in the answer."""
+    with _printing_to(log):
+        try:
+            plugin = plugins.algorithm(method.algorithm, files)
+            instance = spec.build(plugin.name, plugin.load(), method.params)
+            scene, before = trial.scene, trial.views.copy()
+            unsupported = getattr(instance, "unsupported_reason", None)
+            reason = unsupported(scene) if unsupported else None
+            if reason:
+                return Answer(reason=str(reason))
+            estimate = instance.solve(scene, Context(threads=trial.threads))
+            touched = not np.array_equal(scene.views, before)
+            maps = checked(estimate, scene)
+            infinite = sum(int(np.isinf(values).sum()) for values in estimate.disparity.values())
+            volume = b""
+            if estimate.volume is not None:
+                StoredVolume.of(estimate.volume)  # raises where it could not be kept
+                volume = estimate.volume.values.tobytes()
+            told = {name: [float(value) for value in values] for name, values in estimate.history.items()}
+            work = {name: int(count) for name, count in estimate.work.items()}
+            parts = [maps[view].tobytes() for view in sorted(maps)]
+            digest = sha256(b"|".join([*parts, volume, repr((sorted(maps), told, work)).encode()])).hexdigest()
+            return Answer(maps, digest, infinite, touched)
+        except BaseException as error:  # whatever a method raises, SystemExit included
+            traceback.print_exc()
+            return Answer(error=f"{type(error).__name__}: {first_line(error)}{_where(error)}")
+
+
+def _where(error: BaseException) -> str:
+    """The line of the method, or of what it calls, that raised; nothing where the harness did."""
+    frames = [(Path(one.filename), one.lineno) for one in traceback.extract_tb(error.__traceback__)]
+    outside = [f" ({path.name}:{line})" for path, line in frames if path.parent.parent != HARNESS]
+    return outside[-1] if outside else ""
+
+
+def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Path], trial: Trial, log: Path) -> None:
+    """Have a process below this one solve a trial, send its answer, and end it with all that it has started."""
+    processes.stand_apart()  # Ctrl-C is for whoever holds the line
+    answers, theirs = Pipe(duplex=False)
+    watcher, pid = os.getpid(), os.fork()
+    if not pid:
+        try:
+            processes.die_with_parent(watcher)
+            for ours in (line, answers):
+                ours.close()
+            processes.confine(limits.room())
+            own, found = os.getpid(), solve_here(method, files, trial, log)
+            if os.getpid() == own:  # no copy that the method has made of its process
+                theirs.send(found)
+                os._exit(0)
+        finally:
+            os._exit(1)
+    theirs.close()
+    try:
+        with suppress(OSError):  # nobody wants it any more
+            line.send(_heard(answers, line, pid, timeout))
+    finally:
+        processes.end_all_below()
+
+
+def _heard(answers: Connection, line: Connection, pid: int, timeout: float) -> Answer:
+    """What a process that solves a trial has answered, or what became of it."""
+    end, sources = time.monotonic() + timeout, [answers, line]
+    while time.monotonic() < end:
+        ended = processes.reap().get(pid)
+        ready = wait(sources, _TICK if ended is None else 0)
+        if line in ready:
+            return Answer(error="nobody wants to know")
+        if answers in ready:
+            try:
+                found: Answer = answers.recv()
+                return found
+            except EOFError:
+                sources.remove(answers)
+        if ended is not None:
+            code = os.waitstatus_to_exitcode(ended)
+            how = f"signal {-code}" if code < 0 else f"exit status {code}"
+            return Answer(error=f"the method ended its process ({how})")
+    return Answer(error=f"no answer within {timeout:g} s")
+
+
+def solve_apart(method: Method, files: Sequence[Path], trial: Trial, timeout: float) -> Answer:
+    """Solve one trial in a process of its own, which may hang, end as it likes, or leave others behind."""
+    with tempfile.TemporaryDirectory(prefix="matbench-check-") as folder:
+        log = Path(folder) / "log.txt"
+        line, theirs = Pipe()
+        process = get_context("forkserver").Process(target=_watch, args=(theirs, timeout, method, files, trial, log))
+        process.start()
+        theirs.close()
+        try:
+            found: Answer = line.recv()
+        except EOFError:
+            found = Answer(error="the method ended the process that watches it")
+        finally:
+            line.close()
+            process.join()
+        said = log.read_bytes()[-2000:].decode("utf-8", "replace").strip() if log.exists() else ""
+        return evolve(found, output=said)

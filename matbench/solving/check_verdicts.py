@@ -1,0 +1,169 @@
+"""What a method's answers to the small scenes show: one finding for each promise of a method (`matbench check`)."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from matbench.solving.check_scenes import trials
+from matbench.solving.check_solve import Answer
+
+Verdict = Literal["pass", "fail", "skipped", "note"]
+
+AGREEMENT = 0.99  # share of pixels that must agree: rounding decides ties at single ones
+
+
+@frozen
+class CheckResult:
+    """What one check found.
+
+    Parameters
+    ----------
+    check
+        Its name.
+    demand
+        What it asks of a method.
+    verdict
+        ``skipped`` where the method says that it does not support the scene, or nothing could be
+        compared; a ``note`` is no fault.
+    reason
+        What was found; in a failure, what is wrong.
+    """
+
+    check: str
+    demand: str
+    verdict: Verdict
+    reason: str = ""
+
+
+def judge(answers: Mapping[str, Answer]) -> list[CheckResult]:
+    """What the answers to all trials say of a method."""
+    return [
+        _solved("answers", "whole maps of numbers, not all of them NaN", answers, ["easy"], needs_some=True),
+        _solved("views", "two, three and five views", answers, ["two views", "three views", "easy"]),
+        _solved("negative", "disparities of either sign", answers, ["either sign"], needs_some=True),
+        _solved("tiny", "images of any size", answers, ["1x1 px", "one row", "one column", "narrower than the range"]),
+        _solved("constant", "images without any texture", answers, ["constant"]),
+        _in_range(answers),
+        _honest(answers),
+        _leaves_input(answers),
+        _same("seed", "the same seed gives the same answer", answers, "easy again"),
+        _same("threads", "any number of threads gives the same answer", answers, "easy, 3 threads"),
+        _mirrored(answers),
+        _quiet(answers),
+    ]
+
+
+def _solved(
+    name: str, demand: str, answers: Mapping[str, Answer], which: Sequence[str], needs_some: bool = False
+) -> CheckResult:
+    wrong = {one: answers[one].error for one in which if answers[one].error}
+    wrong |= {one: "NaN everywhere" for one in which if needs_some and _is_empty(answers[one])}
+    declined = {one: answers[one].reason for one in which if answers[one].reason}
+    verdict: Verdict = "fail" if wrong else "skipped" if declined else "pass"
+    return CheckResult(name, demand, verdict, _listed(wrong or declined))
+
+
+def _listed(reasons: Mapping[str, str]) -> str:
+    """Trial -> reason, as a line in which each reason stands once."""
+    found: dict[str, list[str]] = {}
+    for trial, reason in reasons.items():
+        found.setdefault(reason, []).append(trial)
+    return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in found.items())
+
+
+def _is_empty(found: Answer) -> bool:
+    return bool(found.maps) and all(np.isnan(values).all() for values in found.maps.values())
+
+
+def _in_range(answers: Mapping[str, Answer]) -> CheckResult:
+    demand = f"{AGREEMENT:.0%} of the answers lie in the range, in pixels per view step"
+    wrong, parts = {}, {}
+    for name in ("easy", "either sign"):
+        parts[name] = answers[name]
+        bounds = trials()[name].disparities
+        answered = [values[~np.isnan(values)] for values in answers[name].maps.values()]
+        found = np.concatenate(answered) if answered else np.empty(0, np.float32)
+        beyond = (found < bounds.least - 1) | (found > bounds.largest + 1)
+        if found.size and beyond.mean() > 1 - AGREEMENT:
+            wrong[name] = f"{beyond.mean():.1%} beyond {bounds} by more than 1, {found.min():g} to {found.max():g}"
+    return _seen("range", demand, parts, wrong)
+
+
+def _honest(answers: Mapping[str, Answer]) -> CheckResult:
+    demand = "no answer is NaN, never infinite"
+    wrong = {name: "infinite" for name, found in answers.items() if found.infinite}
+    return _seen("honest", demand, answers, wrong)
+
+
+def _leaves_input(answers: Mapping[str, Answer]) -> CheckResult:
+    demand = "the views are left as they were"
+    wrong = {name: "changed" for name, found in answers.items() if found.touched}
+    wrong |= {name: found.error for name, found in answers.items() if "read-only" in found.error}
+    return _seen("input", demand, answers, wrong)
+
+
+def _seen(name: str, demand: str, answers: Mapping[str, Answer], wrong: Mapping[str, str]) -> CheckResult:
+    if not wrong and not any(found.maps for found in answers.values()):
+        return CheckResult(name, demand, "skipped", "no answers to look at")
+    return CheckResult(name, demand, "fail" if wrong else "pass", _listed(wrong))
+
+
+def _pair(name: str, demand: str, answers: Mapping[str, Answer], a: str, b: str) -> CheckResult | tuple[Answer, Answer]:
+    """Two answers to compare, or the finding that there are not two."""
+    one, two = answers[a], answers[b]
+    if one.maps and two.maps:
+        return one, two
+    if one.maps and two.error:
+        return CheckResult(name, demand, "fail", f"{b}: {two.error}")
+    return CheckResult(name, demand, "skipped", f"no answer to compare: {one.reason or one.error or two.reason}")
+
+
+def _same(name: str, demand: str, answers: Mapping[str, Answer], other: str) -> CheckResult:
+    pair = _pair(name, demand, answers, "easy", other)
+    if isinstance(pair, CheckResult):
+        return pair
+    one, two = pair
+    if one.digest == two.digest:
+        return CheckResult(name, demand, "pass", "byte for byte")
+    if one.maps.keys() != two.maps.keys():
+        return CheckResult(name, demand, "fail", f"maps of the views {sorted(one.maps)}, then of {sorted(two.maps)}")
+    shares = [np.mean(~_agreeing(one.maps[view], two.maps[view], 0)) for view in one.maps]
+    what = (
+        f"{max(shares):.2%} of a map's pixels differ" if max(shares) else "the maps are the same, volume or work differ"
+    )
+    return CheckResult(name, demand, "fail", what)
+
+
+def _mirrored(answers: Mapping[str, Answer]) -> CheckResult:
+    demand = f"in a mirror, {AGREEMENT:.0%} of the pixels are the same within half a plane"
+    told = []
+    for name in ("easy", "either sign"):
+        pair = _pair("mirror", demand, answers, name, f"{name} mirrored")
+        if isinstance(pair, CheckResult):
+            told.append(pair)
+            continue
+        trial = trials()[name]
+        last = len(trial.views) - 1
+        # planes are a pixel of the field's pair apart
+        same = _agreeing(pair[0].maps[trial.ref], pair[1].maps[last - trial.ref][:, ::-1], 0.5 / trial.pair_steps)
+        told.append(
+            CheckResult("mirror", demand, "pass" if same.mean() >= AGREEMENT else "fail", f"{name} {same.mean():.2%}")
+        )
+    verdicts = {finding.verdict for finding in told}
+    verdict: Verdict = "fail" if "fail" in verdicts else "pass" if "pass" in verdicts else "skipped"
+    return CheckResult("mirror", demand, verdict, "; ".join(dict.fromkeys(finding.reason for finding in told)))
+
+
+def _agreeing(one: NDArray[np.float32], two: NDArray[np.float32], tolerance: float) -> NDArray[np.bool_]:
+    return np.asarray((np.abs(one - two) <= tolerance) | (np.isnan(one) & np.isnan(two)))
+
+
+def _quiet(answers: Mapping[str, Answer]) -> CheckResult:
+    demand = "nothing is printed; what is goes to the cell's log"
+    said = next((found.output for found in answers.values() if found.maps and found.output), "")
+    return CheckResult(
+        "quiet", demand, "note" if said else "pass", f"prints {said.splitlines()[0][:60]!r}" if said else ""
+    )
