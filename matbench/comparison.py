@@ -18,7 +18,7 @@ from matbench.files.writing import write_text
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan, make_plan, methods
-from matbench.plans.record_option import Recording
+from matbench.plans.record_option import RecordOption
 from matbench.plans.settings import Settings
 from matbench.results import freshness, scores
 from matbench.results.repeats import unsteady
@@ -313,7 +313,7 @@ def compare(
     *,
     data: str | Path | None = None,
     out: str | Path | None = None,
-    record: bool | Recording = False,
+    record: bool | RecordOption = False,
     volumes: bool = False,
     seed: int | Sequence[int] = 0,
     plugin: str | Path | Sequence[str | Path] = (),
@@ -361,7 +361,7 @@ def compare(
     UserError
         For anything asked for that cannot be; nothing is written then.
     """
-    wanted = record if isinstance(record, Recording) else Recording() if record else None
+    wanted = record if isinstance(record, RecordOption) else RecordOption() if record else None
     if wanted is not None and row is not None:
         wanted = evolve(wanted, rows=[row] if isinstance(row, int) else row)
     comparison = prepare(

@@ -9,7 +9,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from matbench.measures.volumes import StoredVolume
-from matbench.recording.drawing import as_bytes
+from matbench.recording.reduction import as_bytes
 from matbench.scene import Scene
 from matbench.space import Volume, visibility
 

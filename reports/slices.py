@@ -7,8 +7,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench.algorithm import Estimate
-from matbench.recording import coloring, drawing
-from matbench.recording.probe import RecordingProbe
+from matbench.recording import coloring, reduction
+from matbench.recording.probe import CapturingProbe
 from matbench.reports.columns import INCHES, Drawn, Width, letter, look
 from matbench.scene import Scene
 from matbench.space import DisparitySpace
@@ -65,7 +65,7 @@ class EpipolarPlane:
         return self.views[1] - self.views[0]
 
 
-def epipolar_plane(scene: Scene, probe: RecordingProbe, estimate: Estimate) -> EpipolarPlane | None:
+def epipolar_plane(scene: Scene, probe: CapturingProbe, estimate: Estimate) -> EpipolarPlane | None:
     """What a method told of its first row, and what its answer comes to there; None if that is nothing.
 
     Slices are those of the last pass.
@@ -78,12 +78,12 @@ def epipolar_plane(scene: Scene, probe: RecordingProbe, estimate: Estimate) -> E
     if volume is not None:
         seen = probe.visibility(volume, labels)
         found.append(Slice("visibility", seen.picture[0], f"visibility in the views {_named(seen.names)}"))
-        grey = drawing.as_bytes(probe.slices_of(volume).values[0])
+        grey = reduction.as_bytes(probe.slices_of(volume).values[0])
         found.append(Slice("materiality", np.repeat(grey[:, :, None], 3, axis=2), "materiality, white is high"))
     slopes = next((f.derivative for f in reversed(probe.frames) if f.derivative is not None), None)
     if slopes is not None:
         meaning = "energy derivative according to materiality: red negative, blue positive, black zero"
-        found.append(Slice("energy derivative", drawing.sign_colors(slopes[0]), meaning))
+        found.append(Slice("energy derivative", reduction.sign_colors(slopes[0]), meaning))
     where = volume or probe.latest
     if not found or where is None:
         return None

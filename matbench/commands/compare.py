@@ -7,7 +7,7 @@ from cyclopts import App, Parameter
 
 from matbench.commands.options import DEFAULTS, Options, check_metric, is_of_volumes, many, whole
 from matbench.errors import UserError
-from matbench.plans.record_option import Recording
+from matbench.plans.record_option import RecordOption
 
 app = App(name="compare", help_epilogue="", help_format="markdown")
 
@@ -96,7 +96,7 @@ def compare(
         scene,
         settings=evolve(
             options.settings,
-            record=None if record is None else Recording.of(record, row),
+            record=None if record is None else RecordOption.of(record, row),
             volumes=volumes or is_of_volumes(options.metric),
         ),
         out=options.out,

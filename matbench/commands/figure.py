@@ -77,8 +77,8 @@ def slice_(
     from matbench.algorithm import Context
     from matbench.plans import plugins
     from matbench.plans.limits import cores
-    from matbench.plans.record_option import Recording
-    from matbench.recording.probe import RecordingProbe
+    from matbench.plans.record_option import RecordOption
+    from matbench.recording.probe import CapturingProbe
     from matbench.reports import slices
     from matbench.runs.store import Store
     from matbench.solving.worker import checked, hide_truth
@@ -86,7 +86,7 @@ def slice_(
     store, console = Store(run), Console()
     plan = store.plan()
     chosen = _one(plan.cells, cell)
-    wanted = evolve(Recording.of(rows=row), volumes=False)
+    wanted = evolve(RecordOption.of(rows=row), volumes=False)
     if len(wanted.rows) > 1:
         raise UserError(f"row {row!r}: a figure shows one")
     known = plugins.algorithms(plugin)
@@ -104,7 +104,7 @@ def slice_(
     unsupported = getattr(method, "unsupported_reason", None)
     if unsupported and (reason := unsupported(scene)):
         raise UserError(f"{chosen} was skipped: {reason}")
-    probe = RecordingProbe(wanted.at(scene.height))
+    probe = CapturingProbe(wanted.at(scene.height))
     with console.status(f"{chosen}: solving once more"):
         hidden = hide_truth(scene)
         estimate = method.solve(hidden, Context(chosen.seed, cores(), probe))

@@ -41,11 +41,11 @@ def view(
     """
     from tempfile import TemporaryDirectory
 
-    from matbench.recording import rrd
+    from matbench.recording import viewer
     from matbench.runs.store import Store
 
     if compare is None:
-        rrd.view(run if run.suffix == ".rrd" else Store(run).recording(cell), web)
+        viewer.view(run if run.suffix == ".rrd" else Store(run).recording(cell), web)
         return DONE
     if run.suffix == ".rrd" or cell is not None:
         raise UserError("--compare takes two cells of a run: matbench view RUN --compare A B")
@@ -55,5 +55,5 @@ def view(
     with TemporaryDirectory(prefix="matbench-") as folder:
         path = Path(folder) / "compare.rrd"
         side_by_side.merge(path, one, other)
-        rrd.view(path, web)
+        viewer.view(path, web)
     return DONE

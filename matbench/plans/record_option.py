@@ -16,7 +16,7 @@ def _rows(rows: Iterable[int]) -> tuple[int, ...]:
 
 
 @frozen
-class Recording:
+class RecordOption:
     """What is recorded besides views, regions, maps, errors and energies, which always are.
 
     Parameters
@@ -45,10 +45,10 @@ class Recording:
     rows: tuple[int, ...] = field(default=(), converter=_rows)
 
     @classmethod
-    def of(cls, parts: Iterable[str] = (), rows: str | None = None) -> "Recording":
+    def of(cls, parts: Iterable[str] = (), rows: str | None = None) -> "RecordOption":
         """Read what was typed; without parts, all of them.
 
-        >>> Recording.of(["slices,passes=10"], "144,10").rows
+        >>> RecordOption.of(["slices,passes=10"], "144,10").rows
         (10, 144)
 
         Raises
@@ -73,7 +73,7 @@ class Recording:
             raise UserError(f"{len(wanted)} rows: a recording shows {MOST_ROWS} at most")
         return cls(**chosen, rows=sorted(set(wanted)))  # type: ignore[arg-type]  # names and types are those above
 
-    def at(self, height: int) -> "Recording":
+    def at(self, height: int) -> "RecordOption":
         """The same for a scene of so many rows: the middle one if none was named.
 
         Raises
@@ -86,7 +86,7 @@ class Recording:
                 raise ValueError(f"row {row} is not one of 0..{height - 1}")
         return self if self.rows else evolve(self, rows=(height // 2,))
 
-    def covers(self, other: "Recording") -> bool:
+    def covers(self, other: "RecordOption") -> bool:
         """Does a recording of this hold all that the other asks for?"""
         has_parts = all(getattr(self, part) or not getattr(other, part) for part in self.PARTS)
         return has_parts and self.passes >= other.passes and set(other.rows) <= set(self.rows)

@@ -7,7 +7,7 @@ from attrs import field, frozen
 from attrs.validators import in_
 
 from matbench.plans import limits
-from matbench.plans.record_option import Recording
+from matbench.plans.record_option import RecordOption
 
 Only = Literal["missing", "failed", "all"]
 
@@ -50,7 +50,7 @@ class Settings:
     """
 
     data: Path | None = None
-    record: Recording | None = None
+    record: RecordOption | None = None
     volumes: bool = False
     only: Only | None = field(default=None, validator=in_((None, "missing", "failed", "all")))
     timeout: float | None = field(default=limits.HOUR, converter=limits.seconds)

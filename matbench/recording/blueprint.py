@@ -13,7 +13,7 @@ Panel = rrb.Container | rrb.View
 
 
 @define
-class Slices:
+class SlicePaths:
     """The slices of one epipolar plane.
 
     Parameters
@@ -79,7 +79,7 @@ class Contents:
     truth: bool = False
     estimate: bool = False
     regions: list[EntityPath] = field(factory=list)
-    slices: list[Slices] = field(factory=list)
+    slices: list[SlicePaths] = field(factory=list)
     volumes: list[tuple[EntityPath, int]] = field(factory=list)
     dense: list[EntityPath] = field(factory=list)
     space: EntityPath | None = None

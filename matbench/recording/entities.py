@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from matbench.algorithm import Estimate
 from matbench.measures.metrics import score
-from matbench.recording import coloring, diagram, drawing
-from matbench.recording.about import ERROR_METRIC, MATERIAL, about
-from matbench.recording.blueprint import Contents, EntityPath, Slices
-from matbench.recording.drawing import Reduced
+from matbench.recording import coloring, reduction, space_diagram
+from matbench.recording.blueprint import Contents, EntityPath, SlicePaths
+from matbench.recording.guide import ERROR_METRIC, MATERIAL, guide
 from matbench.recording.perspective import Perspective, Point
-from matbench.recording.probe import Colored, Frame, RecordingProbe, pair_label
+from matbench.recording.probe import CapturingProbe, ColoredSlices, PassCapture, pair_label
+from matbench.recording.reduction import ReducedVolume
 from matbench.scene import Scene
 from matbench.space import DisparitySpace, Volume, surface
 
@@ -37,12 +37,12 @@ _converter = make_converter()
 
 
 @define(eq=False)
-class Recorder:
+class EntityLogger:
     """Logs one part after the other and notes what there is for the blueprint."""
 
     stream: rr.RecordingStream
     scene: Scene
-    probe: RecordingProbe
+    probe: CapturingProbe
     contents: Contents = field(factory=Contents)
     rows: Counter[str] = field(factory=Counter)
 
@@ -64,22 +64,22 @@ class Recorder:
         """The image rows whose epipolar planes are shown."""
         return self.probe.wanted.rows
 
-    def picture(self, *path: str, picture: NDArray[np.uint8], step: int | None = None) -> EntityPath:
+    def log_picture(self, *path: str, picture: NDArray[np.uint8], step: int | None = None) -> EntityPath:
         return self.log(*path, what=rr.Image(picture), step=step)
 
-    def scene_itself(self) -> None:
+    def log_scene(self) -> None:
         """Views, truth and regions."""
         scene, contents = self.scene, self.contents
         limit = min(PICTURE_PIXELS, VIEWS_PIXELS // scene.n)
-        step = drawing.step_within(scene.height, scene.width, limit)
+        step = reduction.step_within(scene.height, scene.width, limit)
         for label, pixels in zip(scene.labels, scene.views, strict=True):
-            contents.views.append(self.picture("views", label, picture=pixels[::step, ::step]))
+            contents.views.append(self.log_picture("views", label, picture=pixels[::step, ::step]))
         contents.reference = contents.views[scene.ref]
         lines = [[(0, y), (ceil(scene.width / step), y)] for y in (row / step + 0.5 for row in self.shown)]
         self.log(*contents.reference, "rows", what=rr.LineStrips2D(lines, colors=YELLOW, radii=THIN))
         if scene.ref in scene.truth:
-            truth = drawing.thinned(scene.truth[scene.ref], PICTURE_PIXELS)
-            self.picture("truth", "disparity", picture=coloring.truth_colors(truth, self.ends))
+            truth = reduction.thinned(scene.truth[scene.ref], PICTURE_PIXELS)
+            self.log_picture("truth", "disparity", picture=coloring.truth_colors(truth, self.ends))
             contents.truth = True
         if scene.scored_regions:
             marked = [(0, "outside", (0, 0, 0, 0)), (1, "inside", (230, 159, 0, 255))]
@@ -88,29 +88,29 @@ class Recorder:
             inside = rr.SegmentationImage(mask[::step, ::step].astype(np.uint8), opacity=0.6)
             contents.regions.append(self.log("regions", name, what=inside))
 
-    def answer(self, estimate: Estimate) -> None:
+    def log_answer(self, estimate: Estimate) -> None:
         """The map, its error, the surface, and where it lies in disparity space."""
         scene, contents, wanted = self.scene, self.contents, self.probe.wanted
         disparity = np.asarray(estimate.disparity[scene.ref], np.float32)
         contents.estimate = True
-        small = drawing.thinned(disparity, PICTURE_PIXELS)
-        self.picture("estimate", "disparity", picture=coloring.disparity_colors(small, self.ends))
+        small = reduction.thinned(disparity, PICTURE_PIXELS)
+        self.log_picture("estimate", "disparity", picture=coloring.disparity_colors(small, self.ends))
         if contents.truth:
-            truth = drawing.thinned(scene.truth[scene.ref], PICTURE_PIXELS)
-            self.picture("estimate", "error", picture=coloring.error_colors(small, truth, scene.pair_steps))
+            truth = reduction.thinned(scene.truth[scene.ref], PICTURE_PIXELS)
+            self.log_picture("estimate", "error", picture=coloring.error_colors(small, truth, scene.pair_steps))
         if wanted.surface:
-            self.surface(disparity)
+            self.log_surface(disparity)
         if wanted.volumes and estimate.volume is not None:
-            self.volumes(estimate.volume)
+            self.log_volumes(estimate.volume)
         if wanted.volumes:
             for name, volume in self.probe.volumes.items():
                 is_pair = name.startswith("similarity/")
                 path = ["similarity", pair_label(name, scene.labels)] if is_pair else name.split("/")
-                self.volume(*path, volume=volume)
+                self.log_volume(*path, volume=volume)
         if wanted.space:
-            self.space(estimate.volume or self.as_volume(disparity), disparity, estimate.volume is not None)
+            self.log_space(estimate.volume or self.as_volume(disparity), disparity, estimate.volume is not None)
 
-    def surface(self, disparity: NDArray[np.float32]) -> None:
+    def log_surface(self, disparity: NDArray[np.float32]) -> None:
         """A map as points in perspective, planes of some disparities, a point's rays, and where views were taken."""
         scene, contents = self.scene, self.contents
         perspective = Perspective.of(scene)
@@ -125,14 +125,14 @@ class Recorder:
             eye = rr.Pinhole(focal_length=width, width=width, height=height, image_plane_distance=0.15)
             self.log(*camera, what=eye)
         planes = np.linspace(*self.ends, PLANES).tolist()
-        self.lines("surface", "planes", strips=[perspective.plane(d) for d in planes], names=_disparities(planes))
+        self.log_lines("surface", "planes", strips=[perspective.plane(d) for d in planes], names=_disparities(planes))
         at = self.pixel(disparity)
         if at is not None:
             rays = [perspective.ray(view, at, float(disparity[at])) for view in range(scene.n)]
-            self.lines("surface", "rays", strips=rays, names=scene.labels, colored=True)
+            self.log_lines("surface", "rays", strips=rays, names=scene.labels, colored=True)
         contents.surface, contents.surface_eye = True, perspective.eye(points)
 
-    def lines(self, *path: str, strips: list[list[Point]], names: Sequence[str], colored: bool = False) -> None:
+    def log_lines(self, *path: str, strips: list[list[Point]], names: Sequence[str], colored: bool = False) -> None:
         """Thin lines, named where they begin: planes in grey, or what belongs to views in the views' colours."""
         colors = [VIEW_COLORS[i % len(VIEW_COLORS)] if colored else FAINT for i in range(len(strips))]
         radii = RAY if colored else THIN
@@ -162,33 +162,33 @@ class Recorder:
         space = DisparitySpace.covering(scene.disparities, scene.n, scene.height, scene.width)
         return surface(space, {scene.ref: disparity}, tuple(range(scene.n)))
 
-    def space(self, volume: Volume, disparity: NDArray[np.float32], is_material: bool) -> None:
+    def log_space(self, volume: Volume, disparity: NDArray[np.float32], is_material: bool) -> None:
         """Target points in disparity space, some of its planes, and the rays that meet in one of them."""
         scene, contents, space = self.scene, self.contents, volume.space
         row = min(self.shown[0], space.rows - 1)
         step = volume.views[1] - volume.views[0]  # the space's disparities are per step of its own views
-        whole = drawing.reduced(volume, row)
-        cells = diagram.voxels(whole, MATERIAL, VOXELS, (self.ends[0] * step, self.ends[1] * step))
+        whole = reduction.reduce_volume(volume, row)
+        cells = space_diagram.voxels(whole, MATERIAL, VOXELS, (self.ends[0] * step, self.ends[1] * step))
         grid = rr.VoxelGridMap(cells.indices, cells.size, colors=cells.colors, translation=cells.origin)
         self.log("space", what=rr.ViewCoordinates.RDF)
         contents.space = self.log("space", "materiality" if is_material else "answer", what=grid)
-        outlines = [diagram.frustum(space, view, row) for view in range(space.views)]
+        outlines = [space_diagram.frustum(space, view, row) for view in range(space.views)]
         names = [scene.labels[view] for view in volume.views]
-        self.lines("space", "frustums", strips=outlines, names=names, colored=True)
+        self.log_lines("space", "frustums", strips=outlines, names=names, colored=True)
         planes = np.unique(np.linspace(0, space.planes - 1, PLANES).round().astype(int)).tolist()
         told = _disparities([float(space.disparities[number]) / step for number in planes])
-        self.lines("space", "planes", strips=[diagram.plane(space, number) for number in planes], names=told)
+        self.log_lines("space", "planes", strips=[space_diagram.plane(space, number) for number in planes], names=told)
         at = self.pixel(disparity)
         if at is not None and scene.ref in volume.views:
             number = round(float(disparity[at]) * step * space.fineness) - space.first
             number = min(max(number, 0), space.planes - 1)
             own = volume.views.index(scene.ref)
-            samples = diagram.target(space, own, at[1] * space.fineness, number)[1]
-            rays = [diagram.ray(space, view, row, sample) for view, sample in enumerate(samples)]
-            self.lines("space", "rays", strips=rays, names=names, colored=True)
-        contents.space_eye = diagram.eye_on(space)
+            samples = space_diagram.target(space, own, at[1] * space.fineness, number)[1]
+            rays = [space_diagram.ray(space, view, row, sample) for view, sample in enumerate(samples)]
+            self.log_lines("space", "rays", strips=rays, names=names, colored=True)
+        contents.space_eye = space_diagram.eye_on(space)
 
-    def passes(self, estimate: Estimate) -> None:
+    def log_passes(self, estimate: Estimate) -> None:
         """What every pass came to, and slices, maps and errors of those that were kept."""
         contents, frames = self.contents, self.probe.frames
         told = dict(self.probe.energies)
@@ -200,21 +200,23 @@ class Recorder:
         contents.told = {name: [value for _, value in points] for name, points in told.items()}
         for frame in frames:
             if frame.disparity is not None:
-                self._map_of(frame, frame.disparity)
+                self._log_pass_map(frame, frame.disparity)
         contents.maps = any(frame.disparity is not None for frame in frames)
         if self.probe.wanted.slices:
             for number, row in enumerate(self.shown):
-                self._slices(number, row, frames, estimate.volume)
+                self._log_slices(number, row, frames, estimate.volume)
 
-    def _map_of(self, frame: Frame, disparity: NDArray[np.float32]) -> None:
+    def _log_pass_map(self, frame: PassCapture, disparity: NDArray[np.float32]) -> None:
         """The map of a pass, its error, and the share of bad pixels in the field's regions."""
         scene, step = self.scene, frame.step
-        self.picture("passes", "disparity", picture=coloring.disparity_colors(disparity, self.ends), step=step)
+        self.log_picture("passes", "disparity", picture=coloring.disparity_colors(disparity, self.ends), step=step)
         if scene.ref not in scene.truth:
             return
         thin = ceil(scene.height / len(disparity))
         truth = scene.truth[scene.ref][::thin, ::thin]
-        self.picture("passes", "error", picture=coloring.error_colors(disparity, truth, scene.pair_steps), step=step)
+        self.log_picture(
+            "passes", "error", picture=coloring.error_colors(disparity, truth, scene.pair_steps), step=step
+        )
         for region in ("all", "nonocc", "occ"):
             if region in scene.regions:
                 mask = scene.regions[region][::thin, ::thin]
@@ -223,17 +225,17 @@ class Recorder:
                     self.log("error", region, what=rr.Scalars(value), step=step)
                     self.contents.error_rates.setdefault(region, []).append(value)
 
-    def _slices(self, number: int, row: int, frames: list[Frame], volume: Volume | None) -> None:
+    def _log_slices(self, number: int, row: int, frames: list[PassCapture], volume: Volume | None) -> None:
         """One epipolar plane: what the method told of it, pass by pass, and what its answer comes to."""
-        here = Slices(row)
+        here = SlicePaths(row)
 
         def add(name: str, picture: NDArray[np.uint8], step: int | None = None, channels: tuple[str, ...] = ()) -> None:
-            path = self.picture("slices", str(row), name, picture=drawing.upright(picture), step=step)
+            path = self.log_picture("slices", str(row), name, picture=reduction.upright(picture), step=step)
             here.paths.setdefault(name, path)
             if channels:
                 here.channels[name] = list(channels)
 
-        def colored(name: str, found: Colored | None) -> None:
+        def colored(name: str, found: ColoredSlices | None) -> None:
             if found is not None:
                 add(name, found.picture[number], channels=found.names)
 
@@ -245,44 +247,44 @@ class Recorder:
             if frame.materiality is not None:
                 add("materiality", frame.materiality[number], frame.step)
             if frame.derivative is not None:
-                add("derivative", drawing.sign_colors(frame.derivative[number]), frame.step)
+                add("derivative", reduction.sign_colors(frame.derivative[number]), frame.step)
         if "materiality" not in here.paths and volume is not None:
-            add("materiality", drawing.as_bytes(self.probe.slices_of(volume).values[number]))
+            add("materiality", reduction.as_bytes(self.probe.slices_of(volume).values[number]))
         if here.paths:
             self.contents.slices.append(here)
 
-    def volumes(self, volume: Volume) -> None:
+    def log_volumes(self, volume: Volume) -> None:
         """Materiality, and how far views see."""
         row = min(self.shown[0], volume.space.rows - 1)
-        self.volume("materiality", volume=drawing.reduced(volume, row))
+        self.log_volume("materiality", volume=reduction.reduce_volume(volume, row))
         seen = np.unique(np.linspace(0, volume.space.views - 1, SEEN_VOLUMES).round().astype(int))
         for index in seen.tolist():
             label = self.scene.labels[volume.views[index]]
-            self.volume("visibility", label, volume=drawing.reduced(volume, row, index))
+            self.log_volume("visibility", label, volume=reduction.reduce_volume(volume, row, index))
 
-    def volume(self, *name: str, volume: Reduced) -> None:
+    def log_volume(self, *name: str, volume: ReducedVolume) -> None:
         """A volume as bytes with a slider over its epipolar planes, and, coarser, in space."""
         tensor = rr.Tensor(volume.values, dim_names=("row", "plane", "column"), value_range=(0, 255))
         path = self.log("volumes", *name, what=tensor)
         row = min(self.shown[0], volume.space.rows - 1)
         self.contents.volumes.append((path, (row - volume.first_row) // volume.steps[0]))
-        made = diagram.dense(drawing.coarser(volume, row, DENSE_BYTES))
+        made = space_diagram.dense(reduction.coarser(volume, row, DENSE_BYTES))
         what = rr.Volume3D(
             made.values,
             voxel_size=made.size,
             translation=made.origin,
             value_range=(0, 1),
-            gamma=diagram.GAMMA,
+            gamma=space_diagram.GAMMA,
             colormap="inferno",
             optical_density=made.depth,
         )
         self.contents.dense.append(self.log("haze", *name, what=what))
 
-    def done(self, title: str) -> None:
+    def log_guide(self, title: str) -> None:
         """How to read it all, and for the viewer what there is."""
         self.contents.title, self.contents.scene = title, self.scene.digest
         self.log(
-            "about", what=rr.TextDocument(about(self.scene, self.shown, self.contents), media_type="text/markdown")
+            "about", what=rr.TextDocument(guide(self.scene, self.shown, self.contents), media_type="text/markdown")
         )
 
 

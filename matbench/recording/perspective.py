@@ -8,7 +8,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench.recording.coloring import disparity_ends
-from matbench.recording.drawing import step_within
+from matbench.recording.reduction import step_within
 from matbench.scene import Scene
 
 DEEPEST = 6.0  # farthest depth over nearest depth of a drawn range of disparities

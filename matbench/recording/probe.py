@@ -7,9 +7,9 @@ from attrs import define, evolve, field, frozen
 from numpy.typing import NDArray
 
 from matbench.algorithm import Probe
-from matbench.plans.record_option import Recording
-from matbench.recording import drawing
-from matbench.recording.drawing import Reduced
+from matbench.plans.record_option import RecordOption
+from matbench.recording import reduction
+from matbench.recording.reduction import ReducedVolume
 from matbench.space import Volume, visibility
 
 TOLD_VOLUMES = 12  # volumes that a method tells; later names are left out
@@ -17,7 +17,7 @@ PASS_PIXELS = 200_000  # the map of a pass
 
 
 @frozen(eq=False)
-class Frame:
+class PassCapture:
     """What is kept of one pass: slices of materiality, of the derivative's sign, and the map."""
 
     step: int
@@ -27,7 +27,7 @@ class Frame:
 
 
 @frozen(eq=False)
-class Colored:
+class ColoredSlices:
     """Up to three slices as red, green and blue.
 
     Parameters
@@ -43,7 +43,7 @@ class Colored:
 
 
 @define(eq=False)
-class RecordingProbe(Probe):
+class CapturingProbe(Probe):
     """Keeps a bounded part of what a method tells, copied: methods may reuse their arrays.
 
     Energies are kept of every pass. Slices and maps are kept of at most so many passes as are
@@ -58,23 +58,23 @@ class RecordingProbe(Probe):
         The slices of the similarity told last.
     """
 
-    wanted: Recording
+    wanted: RecordOption
     active: bool = True
-    volumes: dict[str, Reduced] = field(factory=dict)
+    volumes: dict[str, ReducedVolume] = field(factory=dict)
     similarities: dict[str, NDArray[np.uint8]] = field(factory=dict)
     latest: Volume | None = None
     energies: dict[str, list[tuple[int, float]]] = field(factory=dict)
-    _frames: list[Frame] = field(factory=list)
-    _last: Frame | None = None
+    _frames: list[PassCapture] = field(factory=list)
+    _last: PassCapture | None = None
     _told: int = 0
     _stride: int = 1
 
     def volume(self, name: str, volume: Volume) -> None:
         if self.wanted.slices and name.startswith("similarity/"):
             self.latest = self.slices_of(volume)
-            self.similarities[name] = drawing.as_bytes(self.latest.values)
+            self.similarities[name] = reduction.as_bytes(self.latest.values)
         if self.wanted.volumes and (name in self.volumes or len(self.volumes) < TOLD_VOLUMES):
-            self.volumes[name] = drawing.reduced(volume, min(self.wanted.rows[0], volume.space.rows - 1))
+            self.volumes[name] = reduction.reduce_volume(volume, min(self.wanted.rows[0], volume.space.rows - 1))
 
     def iteration(
         self,
@@ -90,11 +90,11 @@ class RecordingProbe(Probe):
             return
         if not self.wanted.slices:
             volume = derivative = None
-        self._last = Frame(
+        self._last = PassCapture(
             step,
-            None if volume is None else drawing.as_bytes(self.slices_of(volume).values),
+            None if volume is None else reduction.as_bytes(self.slices_of(volume).values),
             None if derivative is None else np.sign(np.nan_to_num(self.slices_of(derivative).values)).astype(np.int8),
-            None if disparity is None else np.array(drawing.thinned(disparity, PASS_PIXELS), np.float32),
+            None if disparity is None else np.array(reduction.thinned(disparity, PASS_PIXELS), np.float32),
         )
         if self._told % self._stride == 0:
             self._frames.append(self._last)
@@ -104,7 +104,7 @@ class RecordingProbe(Probe):
         self._told += 1
 
     @property
-    def frames(self) -> list[Frame]:
+    def frames(self) -> list[PassCapture]:
         """At most so many passes as are wanted, the first and the last one told among them."""
         if self._last is None or self._last is self._frames[-1]:
             return list(self._frames)
@@ -115,7 +115,7 @@ class RecordingProbe(Probe):
         rows = [min(row, volume.space.rows - 1) for row in self.wanted.rows]
         return Volume(evolve(volume.space, rows=len(rows)), volume.values[rows], volume.views)
 
-    def similarity(self, labels: Sequence[str]) -> Colored | None:
+    def similarity(self, labels: Sequence[str]) -> ColoredSlices | None:
         """Three pairs as red, green and blue, called by their views' labels.
 
         Pairs of neighbouring views, if there are three: of more the first, the middle and the last.
@@ -132,19 +132,19 @@ class RecordingProbe(Probe):
         chosen = [in_order[i] for i in sorted({0, len(pool) // 2, len(pool) - 1})]
         return _colored([self.similarities[name] for name in chosen], [pair_label(name, labels) for name in chosen])
 
-    def visibility(self, volume: Volume, labels: Sequence[str]) -> Colored:
+    def visibility(self, volume: Volume, labels: Sequence[str]) -> ColoredSlices:
         """How far the leftmost, the middle and the rightmost view of a volume see, as red, green and blue."""
         here, last = self.slices_of(volume), len(volume.views) - 1
         chosen = sorted({0, (last + 1) // 2, last})
-        seen = [drawing.as_bytes(visibility(here, view)) for view in chosen]
+        seen = [reduction.as_bytes(visibility(here, view)) for view in chosen]
         return _colored(seen, [labels[volume.views[view]] for view in chosen])
 
 
-def _colored(channels: Sequence[NDArray[np.uint8]], names: Sequence[str]) -> Colored:
+def _colored(channels: Sequence[NDArray[np.uint8]], names: Sequence[str]) -> ColoredSlices:
     picture = np.zeros((*channels[0].shape, 3), np.uint8)
     for channel, values in enumerate(channels):
         picture[..., channel] = values
-    return Colored(picture, tuple(names))
+    return ColoredSlices(picture, tuple(names))
 
 
 def pair_of(name: str) -> tuple[int, int] | None:

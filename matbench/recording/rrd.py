@@ -30,7 +30,7 @@ space/frustums                what each view sees of the epipolar plane of the f
 ============================  ===========================================================
 
 Everything is bounded, whatever the scene: see the constants in `matbench.recording.entities` and
-`matbench.recording.drawing`. Tensors keep their values as uint8 and have a slider through the epipolar
+`matbench.recording.reduction`. Tensors keep their values as uint8 and have a slider through the epipolar
 planes; rerun's ray-marched `Volume3D` takes float16 only. Pictures are coloured here and not by
 the viewer, which paints NaN like the largest disparity.
 """
@@ -47,14 +47,11 @@ import rerun as rr
 from rerun.error_utils import RerunWarning
 
 from matbench.algorithm import Estimate, Probe
-from matbench.plans.record_option import Recording
+from matbench.plans.record_option import RecordOption
 from matbench.recording import blueprint
-from matbench.recording.entities import Recorder, contents_text
-from matbench.recording.probe import RecordingProbe
-from matbench.recording.viewer import view
+from matbench.recording.entities import EntityLogger, contents_text
+from matbench.recording.probe import CapturingProbe
 from matbench.scene import Scene
-
-__all__ = ["NOTE", "RecordingError", "RecordingProbe", "kept", "new_stream", "record", "record_scene", "view"]
 
 NOTE = "matbench"
 """The property under which a recording notes what it holds."""
@@ -70,7 +67,7 @@ def record(
     solve: Callable[[Probe], Estimate],
     *,
     title: str,
-    wanted: Recording = Recording(),  # noqa: B008 -- frozen
+    wanted: RecordOption = RecordOption(),  # noqa: B008 -- frozen
 ) -> Estimate:
     """Solve once more, listening, and write what was told to `path`.
 
@@ -101,9 +98,9 @@ def record(
     ValueError
         If the scene has not the rows.
     """
-    probe = RecordingProbe(wanted.at(scene.height))
+    probe = CapturingProbe(wanted.at(scene.height))
     estimate = solve(probe)
-    with kept(path) as beside:
+    with staged(path) as beside:
         verify(beside, _write(beside, scene, probe, estimate, title))
     return estimate
 
@@ -116,12 +113,12 @@ def record_scene(path: Path, scene: Scene) -> None:
     RecordingError
         If what was written cannot be read back.
     """
-    with kept(path) as beside:
-        verify(beside, _write(beside, scene, RecordingProbe(Recording().at(scene.height)), None, scene.name))
+    with staged(path) as beside:
+        verify(beside, _write(beside, scene, CapturingProbe(RecordOption().at(scene.height)), None, scene.name))
 
 
 @contextmanager
-def kept(path: Path) -> Iterator[Path]:
+def staged(path: Path) -> Iterator[Path]:
     """A place beside `path` to write to, moved there when the block ends, gone if it fails.
 
     Errors in what is logged meanwhile are raised; by default rerun prints them and leaves the data out.
@@ -148,23 +145,23 @@ def new_stream(path: Path, title: str) -> rr.RecordingStream:
     return stream
 
 
-def _write(path: Path, scene: Scene, probe: RecordingProbe, estimate: Estimate | None, title: str) -> Counter[str]:
+def _write(path: Path, scene: Scene, probe: CapturingProbe, estimate: Estimate | None, title: str) -> Counter[str]:
     """Write all there is; how many rows were logged for each entity."""
     stream = new_stream(path, title)
     try:
-        recorder = Recorder(stream, scene, probe)
-        recorder.scene_itself()
+        logger = EntityLogger(stream, scene, probe)
+        logger.log_scene()
         if estimate is not None:
-            recorder.answer(estimate)
-            recorder.passes(estimate)
+            logger.log_answer(estimate)
+            logger.log_passes(estimate)
         elif scene.ref in scene.truth:
-            recorder.surface(scene.truth[scene.ref])
-        recorder.done(title)
-        stream.send_property(NOTE, rr.AnyValues(contents=contents_text(recorder.contents)))
-        stream.send_blueprint(blueprint.layout(recorder.contents))
+            logger.log_surface(scene.truth[scene.ref])
+        logger.log_guide(title)
+        stream.send_property(NOTE, rr.AnyValues(contents=contents_text(logger.contents)))
+        stream.send_blueprint(blueprint.layout(logger.contents))
     finally:
         stream.disconnect()  # which also flushes
-    return recorder.rows
+    return logger.rows
 
 
 def verify(path: Path, written: Counter[str]) -> None:

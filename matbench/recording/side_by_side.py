@@ -10,7 +10,7 @@ from matbench.errors import UserError
 from matbench.recording import blueprint
 from matbench.recording.blueprint import Contents
 from matbench.recording.entities import read_contents
-from matbench.recording.rrd import NOTE, kept, new_stream, verify
+from matbench.recording.rrd import NOTE, new_stream, staged, verify
 
 SIDES = ("A", "B")
 
@@ -35,7 +35,7 @@ def merge(path: Path, one: Path, other: Path) -> None:
     if sides[0].method == sides[1].method:  # two runs or seeds of one method: say which is which
         sides = [evolve(c, title=f"{name} {c.title}") for c, name in zip(sides, SIDES, strict=True)]
     written: Counter[str] = Counter()
-    with kept(path) as beside:
+    with staged(path) as beside:
         stream = new_stream(beside, f"{sides[0].title} | {sides[1].title}")
         try:
             for contents, source in zip(sides, (one, other), strict=True):

@@ -23,7 +23,7 @@ from matbench.errors import UserError
 from matbench.files.writing import write_text
 from matbench.measures.volumes import StoredVolume
 from matbench.plans.plan import Cell, Plan
-from matbench.plans.record_option import Recording
+from matbench.plans.record_option import RecordOption
 from matbench.runs import provenance
 from matbench.runs.lock import LOCK, WORK, locked
 
@@ -81,7 +81,7 @@ class Outcome:
     has_volume: bool = False
     work: Mapping[str, int] = {}
     history: Mapping[str, list[float | None]] = {}
-    recorded: Recording | None = None
+    recorded: RecordOption | None = None
     alone: bool = True
     maps: str = ""
     ran_on: Mapping[str, str] = {}

@@ -8,14 +8,14 @@ from machines import Machines, wait_until
 from shown import SCENE
 
 from matbench.cli import app
-from matbench.recording import rrd
+from matbench.recording import viewer
 
 HEAD = "tcp://head:8786"
 
 
 def test_commands_run_one_after_another(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[bool] = []
-    monkeypatch.setattr(rrd, "view", lambda path, web: seen.append(path.is_file()))
+    monkeypatch.setattr(viewer, "view", lambda path, web: seen.append(path.is_file()))
     for line in sorted(lines("plain"), key=stage):
         desk.follow(shortened(line, RUN="runs/mine"))
         if " scene new " in line:

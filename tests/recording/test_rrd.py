@@ -14,11 +14,12 @@ from attrs import evolve
 
 from matbench.algorithm import Context, Estimate, Probe
 from matbench.measures.metrics import score
-from matbench.plans.record_option import Recording
-from matbench.recording import coloring, diagram, drawing, rrd
-from matbench.recording.about import ERROR_METRIC
+from matbench.plans.record_option import RecordOption
+from matbench.recording import coloring, reduction, rrd, space_diagram
+from matbench.recording.guide import ERROR_METRIC
 from matbench.recording.perspective import DEEPEST, Perspective
-from matbench.recording.rrd import RecordingError, RecordingProbe, record, record_scene
+from matbench.recording.probe import CapturingProbe
+from matbench.recording.rrd import RecordingError, record, record_scene
 from matbench.regions import VIEW_REGIONS
 from matbench.scene import Range, Scene
 from matbench.space import DisparitySpace, Volume, visibility
@@ -115,7 +116,7 @@ def path(told: tuple[Scene, Teller], tmp_path_factory: pytest.TempPathFactory) -
         scene,
         lambda probe: teller.solve(scene, Context(probe=probe)),
         title="t on s/x",
-        wanted=Recording(rows=(ROW, OTHER)),
+        wanted=RecordOption(rows=(ROW, OTHER)),
     )
     assert estimate.disparity[1] is teller.answer
     return path
@@ -234,7 +235,7 @@ def test_volumes_in_space_are_those_of_the_sliders(rows: dict[str, list[Row]]) -
         assert tuple(shape) == expected.shape
         assert np.allclose(values.reshape(shape), expected, atol=1e-3)
         through = field["Volume3D:optical_density"] * np.mean(expected ** field["Volume3D:gamma"])
-        assert through == pytest.approx(diagram.THROUGH_ALL, rel=0.01), "full or nearly empty, it is seen"
+        assert through == pytest.approx(space_diagram.THROUGH_ALL, rel=0.01), "full or nearly empty, it is seen"
 
 
 def test_rays_meet_in_the_target_point(path: Path, told: tuple[Scene, Teller]) -> None:
@@ -327,7 +328,7 @@ def test_depths_are_positive_and_bounded(least: float, largest: float) -> None:
 @pytest.mark.parametrize("passes", [1, 2, 19, 20, 21, 50, 333])
 @pytest.mark.parametrize("most", [20, 7, 1])
 def test_few_passes_are_kept_of_many(passes: int, most: int) -> None:
-    probe, state = RecordingProbe(Recording(passes=most, rows=(0,))), np.zeros((1, 1), np.float32)
+    probe, state = CapturingProbe(RecordOption(passes=most, rows=(0,))), np.zeros((1, 1), np.float32)
     for step in range(passes):
         probe.iteration(step, {"total": 1.0}, disparity=state)
     kept = [frame.step for frame in probe.frames]
@@ -411,7 +412,7 @@ def test_two_recordings_do_not_mix(tmp_path: Path) -> None:
 
 def test_a_row_outside_the_scene(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"row 20 is not one of 0\.\.19"):
-        record(tmp_path / "r.rrd", make_scene(), lambda probe: Estimate({}), title="t", wanted=Recording(rows=(20,)))
+        record(tmp_path / "r.rrd", make_scene(), lambda probe: Estimate({}), title="t", wanted=RecordOption(rows=(20,)))
 
 
 @pytest.mark.parametrize("fineness", [1, 2])
@@ -419,15 +420,15 @@ def test_a_reduced_volume_is_exact_where_it_is_kept(fineness: int) -> None:
     space = DisparitySpace(3, 40, 60, -4, 9, fineness)
     values = np.random.default_rng(0).random(space.shape, np.float32)
     volume = Volume(space, values, (0, 1, 2))
-    small = drawing.reduced(volume, 17, limit=values.size // 8)
+    small = reduction.reduce_volume(volume, 17, limit=values.size // 8)
     assert small.values.size <= values.size // 8
     rows, planes, columns = small.steps
     assert planes == 1
     assert (17 - small.first_row) % rows == 0
     assert np.array_equal(small.values, np.rint(255 * values[small.first_row :: rows, :, ::columns]))
-    seen = drawing.reduced(volume, 17, view=2, limit=values.size // 8)
+    seen = reduction.reduce_volume(volume, 17, view=2, limit=values.size // 8)
     assert np.array_equal(seen.values, np.rint(255 * visibility(volume, 2)[small.first_row :: rows, :, ::columns]))
-    tiny = drawing.reduced(volume, 17, limit=20)
+    tiny = reduction.reduce_volume(volume, 17, limit=20)
     assert tiny.values.size <= 20
 
 
@@ -456,7 +457,7 @@ def test_a_quarter_size_cell_is_small_and_quick(tmp_path: Path) -> None:
 
 def test_pairs_of_a_reference_fill_all_three_colours() -> None:
     space = DisparitySpace(5, 2, 4, 0, 1)
-    probe = RecordingProbe(Recording(rows=(0,)))
+    probe = CapturingProbe(RecordOption(rows=(0,)))
     for pair, value in ((("0", "2"), 0.2), (("1", "2"), 0.4), (("2", "3"), 0.6), (("2", "4"), 0.8)):
         values = np.full(space.shape, value, np.float32)
         probe.volume(f"similarity/{'-'.join(pair)}", Volume(space, values, (0, 1, 2, 3, 4)))

@@ -12,7 +12,7 @@ from attrs import evolve
 from matbench.algorithm import Estimate, Probe
 from matbench.cli import main
 from matbench.errors import UserError
-from matbench.plans.record_option import Recording
+from matbench.plans.record_option import RecordOption
 from matbench.recording import blueprint, side_by_side
 from matbench.recording.blueprint import Contents
 from matbench.recording.rrd import record
@@ -27,7 +27,7 @@ def scene(name: str = "toy/box") -> Scene:
     return Scene(name, views, ("a", "b", "c"), 1, Range(0, 5), {1: truth}, 1.0, {"all": np.isfinite(truth)})
 
 
-def write(path: Path, of: Scene, title: str, passes: int, wanted: Recording = Recording()) -> Path:  # noqa: B008
+def write(path: Path, of: Scene, title: str, passes: int, wanted: RecordOption = RecordOption()) -> Path:  # noqa: B008
     """A method with a volume and several passes, or, with none, only a map."""
     space = DisparitySpace.covering(of.disparities, of.n, of.height, of.width)
     volume = Volume(space, np.random.default_rng(passes).random(space.shape, np.float32), (0, 1, 2))
@@ -99,7 +99,7 @@ def test_what_a_recording_notes_of_itself_is_read_back(tmp_path: Path) -> None:
     ],
 )
 def test_only_what_was_chosen_is_recorded(tmp_path: Path, chosen: list[str], has: list[str], lacks: list[str]) -> None:
-    found = rows(write(tmp_path / "1.rrd", scene(), "m on toy/box", 5, Recording.of(chosen)))
+    found = rows(write(tmp_path / "1.rrd", scene(), "m on toy/box", 5, RecordOption.of(chosen)))
     assert set(has) <= set(found)
     assert not [entity for entity in found if entity.startswith(tuple(lacks))]
     assert {"/estimate/error", "/energy/total", "/regions/all"} <= set(found), "these always are"
@@ -135,16 +135,16 @@ def test_panels_are_for_what_is_there(tmp_path: Path) -> None:
 
 
 def test_choices_are_read_and_compared() -> None:
-    assert Recording.of() == Recording(), "without parts, all of them"
-    assert Recording.of(["slices,passes=10"]) == Recording(True, False, False, False, 10)
-    assert Recording.of(["all"], "9,3,9").rows == (3, 9)
-    assert Recording.of(["passes"]).passes == 20
-    full = Recording().at(20)
+    assert RecordOption.of() == RecordOption(), "without parts, all of them"
+    assert RecordOption.of(["slices,passes=10"]) == RecordOption(True, False, False, False, 10)
+    assert RecordOption.of(["all"], "9,3,9").rows == (3, 9)
+    assert RecordOption.of(["passes"]).passes == 20
+    full = RecordOption().at(20)
     assert full.rows == (10,)
-    assert full.covers(Recording())
-    assert full.covers(Recording.of(["slices,passes=5"], "10"))
-    assert not full.covers(Recording(rows=(3,)))
-    assert not Recording.of(["slices"], "10").covers(full)
+    assert full.covers(RecordOption())
+    assert full.covers(RecordOption.of(["slices,passes=5"], "10"))
+    assert not full.covers(RecordOption(rows=(3,)))
+    assert not RecordOption.of(["slices"], "10").covers(full)
 
 
 @pytest.mark.parametrize(

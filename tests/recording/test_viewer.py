@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from matbench.errors import UserError
-from matbench.recording.rrd import record_scene, view
+from matbench.recording.rrd import record_scene
+from matbench.recording.viewer import view
 from matbench.scene import Range, Scene
 
 

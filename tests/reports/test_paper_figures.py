@@ -13,10 +13,10 @@ from matbench import comparison, load_scene
 from matbench.algorithm import Context
 from matbench.cli import main
 from matbench.errors import UserError
-from matbench.plans.record_option import Recording
+from matbench.plans.record_option import RecordOption
 from matbench.plans.settings import Settings
-from matbench.recording import coloring, drawing
-from matbench.recording.probe import RecordingProbe
+from matbench.recording import coloring, reduction
+from matbench.recording.probe import CapturingProbe
 from matbench.reports import columns, maps, slices
 from matbench.runs.store import Store
 from matbench.scene import Range, Scene
@@ -69,25 +69,25 @@ def test_slices_are_the_arrays_told() -> None:
 
     scene = load_scene(SMALL)
     method = evolve(Materiality(**Materiality.presets["paper"]), passes=2)  # type: ignore[arg-type]
-    probe = RecordingProbe(Recording(rows=(20,)))
+    probe = CapturingProbe(RecordOption(rows=(20,)))
     told = {}
 
-    class Both(RecordingProbe):
+    class Both(CapturingProbe):
         def volume(self, name, volume):  # type: ignore[no-untyped-def]
             told[name] = volume.values[20].copy()
             super().volume(name, volume)
 
-    probe = Both(Recording(rows=(20,)))
+    probe = Both(RecordOption(rows=(20,)))
     estimate = method.solve(scene, Context(0, 1, probe))
     plane = slices.epipolar_plane(scene, probe, estimate)
     assert plane is not None
     assert estimate.volume is not None
     pictures = {one.name: one.picture for one in plane.slices}
     assert list(pictures) == ["similarity", "visibility", "materiality", "energy derivative"]
-    pairs = np.stack([drawing.as_bytes(values) for values in told.values()], axis=2)
+    pairs = np.stack([reduction.as_bytes(values) for values in told.values()], axis=2)
     assert np.array_equal(pictures["similarity"], pairs)
-    assert np.array_equal(pictures["materiality"][:, :, 1], drawing.as_bytes(estimate.volume.values[20]))
-    seen = drawing.as_bytes(visibility(estimate.volume, 0)[20])
+    assert np.array_equal(pictures["materiality"][:, :, 1], reduction.as_bytes(estimate.volume.values[20]))
+    seen = reduction.as_bytes(visibility(estimate.volume, 0)[20])
     assert np.array_equal(pictures["visibility"][:, :, 0], seen)
     drawn = slices.draw(scene, plane, "m")
     top = [axis.images[0].get_array() for axis in drawn.figure.axes[:2]]

@@ -66,7 +66,7 @@ def sign_colors(derivative: NDArray[np.integer]) -> NDArray[np.uint8]:
 
 
 @frozen(eq=False)
-class Reduced:
+class ReducedVolume:
     """A volume small enough to be kept: every k-th row and column, thick planes, as bytes.
 
     Parameters
@@ -102,7 +102,7 @@ def steps_within(space: DisparitySpace, limit: int) -> tuple[int, int, int]:
     return steps[0], steps[1], steps[2]
 
 
-def reduced(volume: Volume, row: int, view: int | None = None, limit: int = VOLUME_BYTES) -> Reduced:
+def reduce_volume(volume: Volume, row: int, view: int | None = None, limit: int = VOLUME_BYTES) -> ReducedVolume:
     """A volume, or with `view` the visibility that follows from it there, as at most `limit` bytes.
 
     Row `row` is among the kept ones. Rows go first: epipolar planes stand alone, so that the
@@ -116,17 +116,17 @@ def reduced(volume: Volume, row: int, view: int | None = None, limit: int = VOLU
     values = values[:, :, :: steps[2]]
     if steps[1] > 1:
         values = np.maximum.reduceat(values, np.arange(0, values.shape[1], steps[1]), axis=1)
-    return Reduced(space, as_bytes(values), first, steps)
+    return ReducedVolume(space, as_bytes(values), first, steps)
 
 
-def coarser(volume: Reduced, row: int, limit: int) -> Reduced:
+def coarser(volume: ReducedVolume, row: int, limit: int) -> ReducedVolume:
     """The same with every k-th row and column of it, at most `limit` bytes; row `row` is among them."""
     rows, planes, columns = volume.values.shape
     step = 1
     while ceil(rows / step) * planes * ceil(columns / step) > limit and step < max(rows, columns):
         step += 1
     thick, first = volume.steps, (row - volume.first_row) // volume.steps[0] % step
-    return Reduced(
+    return ReducedVolume(
         volume.space,
         volume.values[first::step, :, ::step],
         volume.first_row + first * thick[0],

@@ -9,8 +9,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench.recording.coloring import disparity_colors
-from matbench.recording.drawing import Reduced
 from matbench.recording.perspective import Eye, Point, from_the_side
+from matbench.recording.reduction import ReducedVolume
 from matbench.space import DisparitySpace
 
 GAMMA = 2.0
@@ -44,7 +44,7 @@ class Voxels:
     origin: Point
 
 
-def voxels(volume: Reduced, least: float, limit: int, ends: tuple[float, float]) -> Voxels:
+def voxels(volume: ReducedVolume, least: float, limit: int, ends: tuple[float, float]) -> Voxels:
     """The elements of at least `least`; with more than `limit`, those of the largest values.
 
     `ends` are those of the colours of disparities.
@@ -116,14 +116,14 @@ class Dense:
     depth: float
 
 
-def dense(volume: Reduced) -> Dense:
+def dense(volume: ReducedVolume) -> Dense:
     """All elements of a volume where they are in disparity space."""
     values = volume.values.transpose(1, 0, 2)[::-1].astype(np.float16) / np.float16(255)
     filled = float(np.mean(values.astype(np.float32) ** GAMMA))
     return Dense(values, *_grid(volume), THROUGH_ALL / max(filled, 0.5 / len(values)))
 
 
-def _grid(volume: Reduced) -> tuple[Point, Point]:
+def _grid(volume: ReducedVolume) -> tuple[Point, Point]:
     """The size of an element and the corner of the first one."""
     space, (rows, thick, columns) = volume.space, volume.steps
     size = (columns / space.fineness, float(rows), _depth(space, space.planes - thick))

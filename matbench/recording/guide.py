@@ -10,7 +10,7 @@ MATERIAL = 0.25  # least materiality of a drawn voxel
 ERROR_METRIC = next(metric for metric in METRICS if metric.name == "total_bad_1")  # of passes
 
 
-def about(scene: Scene, rows: tuple[int, ...], contents: Contents) -> str:
+def guide(scene: Scene, rows: tuple[int, ...], contents: Contents) -> str:
     """What stands where, as markdown.
 
     Parameters
