@@ -59,7 +59,7 @@ def regions(
         the left.
     seen
         (H, W) bool, whether the partner sees the point, where that is known exactly; by default
-        `seen_from` decides.
+        `points_seen` decides.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def regions(
     a depth jump or an occlusion, and what lacks texture.
     """
     known = np.isfinite(truth)
-    nonocc = known & (seen_from(truth, partner) if seen is None else seen)
+    nonocc = known & (points_seen(truth, partner) if seen is None else seen)
     occ = known & ~nonocc
     return {
         "all": known,
@@ -79,7 +79,7 @@ def regions(
     }
 
 
-def seen_from(truth: NDArray[np.float32], steps: float) -> Mask:
+def points_seen(truth: NDArray[np.float32], steps: float) -> Mask:
     """Which points a view `steps` to the right sees (to the left if negative), the frame included.
 
     Every pixel is carried to the nearest column of that view; where several meet, all are seen
@@ -126,7 +126,7 @@ def view_regions(truth: NDArray[np.float32], ref: int, count: int, seen: Mask | 
         Which of how many views that is.
     seen
         (count, H, W) bool, whether each view sees the point, where that is known exactly; by
-        default `seen_from` decides, with its tolerance of a pixel between the two views: a strip
+        default `points_seen` decides, with its tolerance of a pixel between the two views: a strip
         that is narrower than that is not found, and what has no known truth hides nothing. A
         point inside the frame's columns that a view does not see counts as hidden.
 
@@ -142,7 +142,7 @@ def view_regions(truth: NDArray[np.float32], ref: int, count: int, seen: Mask | 
             continue
         place = np.floor(columns - (view - ref) * places + 0.5)
         inside = (place >= 0) & (place < truth.shape[1])
-        sees = seen_from(truth, view - ref) if seen is None else seen[view]
+        sees = points_seen(truth, view - ref) if seen is None else seen[view]
         seen_by += sees
         hidden_from += inside & ~sees
         left += ~inside & ~sees

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from matbench.measures.statistics import FEW
-from matbench.reports.figures import ACROSS, INK, dress, grid_of, line_style, name_curves
+from matbench.reports.page_figures import ACROSS, INK, dress, grid_of, line_style, name_curves
 from matbench.reports.tables import METRIC, label, metrics, regions
 from matbench.reports.tables import text as shown
 from matbench.results.sweeps import Sweep

@@ -66,7 +66,7 @@ class Coding:
 
         Values beyond the ends are moved there; a picture longer than `side` is thinned, not blended.
         """
-        values = thinned(disparity, side).astype(np.float64) * pair_steps
+        values = thinned_to_side(disparity, side).astype(np.float64) * pair_steps
         known = np.isfinite(values)
         most = (_COARSE // self.gain) * FINER - 1
         level = np.zeros(values.shape, np.intp)
@@ -87,7 +87,7 @@ def size_within(height: int, width: int, side: int) -> tuple[int, int]:
     return max(1, round(height * shrink)), max(1, round(width * shrink))
 
 
-def thinned(values: NDArray[np.float32], side: int) -> NDArray[np.float32]:
+def thinned_to_side(values: NDArray[np.float32], side: int) -> NDArray[np.float32]:
     """A map with the longer side at most `side`: some of its pixels, as they are."""
     rows, columns = size_within(values.shape[0], values.shape[1], side)
     if (rows, columns) == values.shape:

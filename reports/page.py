@@ -16,18 +16,18 @@ from matbench.files.writing import write_text
 from matbench.measures.statistics import FEW
 from matbench.recording import coloring
 from matbench.regions import REGIONS
-from matbench.reports import curves, errors, figures, passes, switches, tables
+from matbench.reports import curves, error_spread, page_figures, passes, switches, tables
 from matbench.reports.content import Report
 from matbench.reports.numbers import COSTS, Numbers
 from matbench.reports.pictures import gallery
 from matbench.reports.tables import METRIC, REGION, Shared
 
-__all__ = ["Report", "render", "write"]
+__all__ = ["Report", "render", "write_page"]
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def write(path: Path, report: Report) -> None:
+def write_page(path: Path, report: Report) -> None:
     """Write the page of a run, whole or not at all."""
     write_text(path, render(report))
 
@@ -53,7 +53,7 @@ def render(report: Report) -> str:
     )
     environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "separators": (",", ":")}
     environment.filters["breakable"] = _breakable
-    by_views, by_views_notes = errors.by_views(shown.spreads, scope)
+    by_views, by_views_notes = error_spread.by_views(shown.spreads, scope)
     return environment.get_template("report.html.j2").render(
         report=report,
         scope=scope,
@@ -76,17 +76,17 @@ def render(report: Report) -> str:
         passes=passes.lines(report, scope),
         by_views=_svg(by_views),
         by_views_notes=by_views_notes,
-        reliability=_svg(figures.reliability(report.reliability)),
+        reliability=_svg(page_figures.reliability(report.reliability)),
         cost_figures=_cost_figures(numbers, rows),
-        thresholds=_svg(errors.thresholds(shown.spreads, scope)),
+        thresholds=_svg(error_spread.thresholds(shown.spreads, scope)),
         curves=_curves(report),
         switches=[] if report.ablation is None else switches.lines(report.ablation).values.tolist(),
         forest=None if report.ablation is None else _svg(switches.forest(report.ablation)),
         bad=_records(report.cells[report.cells["status"] != "ok"], ("method", "scene", "seed", "status", "reason")),
         methods=_methods(report),
-        disparity_bar=figures.gradient(coloring.DISPARITY),
-        error_bar=figures.gradient(coloring.ERROR),
-        difference_bar=figures.gradient(coloring.DIFFERENCE),
+        disparity_bar=page_figures.gradient(coloring.DISPARITY),
+        error_bar=page_figures.gradient(coloring.ERROR),
+        difference_bar=page_figures.gradient(coloring.DIFFERENCE),
         error_limit=coloring.WORST,
         data={
             **numbers.data(),
@@ -161,12 +161,12 @@ def _cost_figures(numbers: Numbers, rows: pd.DataFrame) -> list[str]:
     """Accuracy against seconds, and against memory."""
     memory = {m: entry[0] for m, entry in numbers.costs.get("peak_mb", {}).items()}
     costs = rows.assign(memory=pd.Series(memory, dtype=float).reindex(rows.index))
-    drawn = (figures.cost(costs, f"{METRIC} {REGION}", "%", against) for against in figures.COSTS)
-    return [figures.svg(figure) for figure in drawn if figure is not None]
+    drawn = (page_figures.cost(costs, f"{METRIC} {REGION}", "%", against) for against in page_figures.COSTS)
+    return [page_figures.svg(figure) for figure in drawn if figure is not None]
 
 
 def _svg(figure: "Figure | None") -> str | None:
-    return None if figure is None else figures.svg(figure)
+    return None if figure is None else page_figures.svg(figure)
 
 
 def _curves(report: Report) -> list[dict[str, Any]]:

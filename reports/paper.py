@@ -205,7 +205,7 @@ def _notes(cells: pd.DataFrame, scope: Shared) -> list[str]:
     return notes
 
 
-def write(made: Sheet, format: Format) -> str:
+def formatted(made: Sheet, format: Format) -> str:
     """The table in one of `FORMATS`."""
     return {"tex": latex, "md": markdown, "csv": comma_separated}[format](made)
 

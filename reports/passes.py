@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from matbench.reports import figures
+from matbench.reports import page_figures
 from matbench.reports.content import Report
 from matbench.reports.tables import Shared, label
 
@@ -34,19 +34,21 @@ def energies(report: Report, scope: Shared) -> "Figure | None":
     drawn = {m: cells for m, cells in drawn.items() if cells}
     if not drawn:
         return None
-    figure, grid = figures.grid_of(len(drawn))
+    figure, grid = page_figures.grid_of(len(drawn))
     for place, (axes, (method, cells)) in enumerate(zip(grid, drawn.items(), strict=True)):
         for values in cells:
             axes.plot(np.arange(1, len(values) + 1), values, color="#0072b2", lw=1, alpha=0.5)
         longest = max(map(len, cells))
         padded = pd.DataFrame(cells, columns=range(1, longest + 1))
-        axes.plot(padded.columns, padded.median(), color=figures.INK, lw=2)
+        axes.plot(padded.columns, padded.median(), color=page_figures.INK, lw=2)
         axes.set_ylim(bottom=0, top=max(105.0, float(np.nanmax(padded.to_numpy())) * 1.05))
-        axes.set_title(figures.printable(method, 36), loc="left", fontsize=9, color=figures.INK, parse_math=False)
-        figures.dress(axes)
-        axes.set_xlabel("pass", color=figures.INK)
-        if place % figures.ACROSS == 0:
-            axes.set_ylabel("energy, % of the first pass", color=figures.INK)
+        axes.set_title(
+            page_figures.printable(method, 36), loc="left", fontsize=9, color=page_figures.INK, parse_math=False
+        )
+        page_figures.dress(axes)
+        axes.set_xlabel("pass", color=page_figures.INK)
+        if place % page_figures.ACROSS == 0:
+            axes.set_ylabel("energy, % of the first pass", color=page_figures.INK)
     return figure
 
 

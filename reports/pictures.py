@@ -9,7 +9,7 @@ import pandas as pd
 from attrs import frozen
 
 from matbench.recording import coloring
-from matbench.reports import epipolar, errors
+from matbench.reports import error_spread, page_slices
 from matbench.reports.content import Report
 from matbench.reports.encoding import LEAST_SIDE, Coding, exact, photograph, side_for, size_within
 from matbench.reports.tables import Shared
@@ -40,7 +40,7 @@ class Gallery:
     scenes: list[dict[str, Any]]
     codings: list[dict[str, Any] | None]
     slices: list[list[dict[str, Any]]]
-    spreads: errors.Spreads
+    spreads: error_spread.Spreads
 
     @property
     def characters(self) -> int:
@@ -65,7 +65,7 @@ def gallery(report: Report, scope: Shared, most: int = MOST) -> Gallery:
 def _gallery(report: Report, scope: Shared, side: int) -> Gallery:
     """Read every map once, and every volume that was kept."""
     out = Gallery([], [], [], {})
-    spreads: dict[tuple[str, str], errors.Spread] = {}
+    spreads: dict[tuple[str, str], error_spread.Spread] = {}
     for name in scope.asked:
         cells = sorted(_first_seeds(report.cells, name), key=lambda c: scope.methods.index(c["method"]))
         scene = report.scenes.get(name)
@@ -74,7 +74,7 @@ def _gallery(report: Report, scope: Shared, side: int) -> Gallery:
             out.codings.append(None)
             out.slices.append([])
             continue
-        coding, seeing = Coding.of(scene), errors.views_seeing(scene)
+        coding, seeing = Coding.of(scene), error_spread.views_seeing(scene)
 
         def shown(
             cell: dict[str, Any], scene: Scene = scene, coding: Coding = coding, seeing: Any = seeing
@@ -131,7 +131,7 @@ def _names(cell: dict[str, Any]) -> tuple[str, str, str, int]:
 
 
 def _map(
-    report: Report, scene: Scene, cell: dict[str, Any], coding: Coding, side: int, seeing: errors.Counts | None
+    report: Report, scene: Scene, cell: dict[str, Any], coding: Coding, side: int, seeing: error_spread.Counts | None
 ) -> dict[str, Any]:
     disparity = report.disparity(*_names(cell)) if cell["status"] == "ok" else None
     reason = cell.get("reason")
@@ -146,25 +146,25 @@ def _map(
     if disparity is not None:
         disparity = disparity.astype(np.float32, copy=False)
         out["map"] = coding.encode(disparity, scene.pair_steps, side)
-        out["spread"] = None if seeing is None else errors.spread(disparity, scene, seeing)
+        out["spread"] = None if seeing is None else error_spread.spread(disparity, scene, seeing)
     return out
 
 
 def _slices(report: Report, scene: Scene, cells: list[dict[str, Any]], side: int) -> list[dict[str, Any]]:
     """Row by row: the similarity of the views and, of every method with a volume, materiality and visibility."""
-    rows = epipolar.rows_of(scene, report.rows)
+    rows = page_slices.rows_of(scene, report.rows)
     out: list[dict[str, Any]] = [
-        {"row": row, "similarity": _picture(epipolar.similarity(scene, row), side), "methods": {}} for row in rows
+        {"row": row, "similarity": _picture(page_slices.similarity(scene, row), side), "methods": {}} for row in rows
     ]
     for cell in cells:
         volume = report.volumes(*_names(cell)) if cell["status"] == "ok" else None
         for row, part in zip(rows, out, strict=True):
-            found = None if volume is None else epipolar.materiality(volume, scene, row)
+            found = None if volume is None else page_slices.materiality(volume, scene, row)
             if found is not None:
                 part["methods"][cell["method"]] = [_picture(one, side) for one in found]
     return out
 
 
-def _picture(one: epipolar.Slice, side: int) -> dict[str, Any]:
+def _picture(one: page_slices.PageSlice, side: int) -> dict[str, Any]:
     thin = one.values[:, :: -(-one.values.shape[1] // side)]
     return {"src": exact(np.ascontiguousarray(thin)), "ends": [round(end, 4) for end in one.ends]}

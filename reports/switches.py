@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from matbench.reports.figures import INK
+from matbench.reports.page_figures import INK
 from matbench.reports.paper import tex
 from matbench.reports.tables import METRIC, REGIONS
 

@@ -8,7 +8,7 @@ import pytest
 from matbench.datasets.middlebury import MIDDLEBURY_2001, MIDDLEBURY_2003
 from matbench.datasets.synthetic import SYNTHETIC, WORLDS
 from matbench.files.images import read_grey
-from matbench.regions import VIEW_REGIONS, near_jumps, regions, seen_from, textureless, view_regions
+from matbench.regions import VIEW_REGIONS, near_jumps, points_seen, regions, textureless, view_regions
 from matbench.scene import Scene
 
 NAN = np.nan
@@ -51,25 +51,25 @@ def test_regions_nest(data_root: Path) -> None:
 def test_nearer_surface_hides_and_the_frame_ends() -> None:
     truth = np.array([[1, 1, 1, 1, 4, 4, 1, 1, NAN]], np.float32)
     # carried to -1 0 1 2 | 0 1 | 5 6
-    np.testing.assert_array_equal(seen_from(truth, 1)[0], np.array([0, 0, 0, 1, 1, 1, 1, 1, 0], bool))
+    np.testing.assert_array_equal(points_seen(truth, 1)[0], np.array([0, 0, 0, 1, 1, 1, 1, 1, 0], bool))
     # to the left everything moves to larger columns: 1 2 3 4 | 8 9 | 7 8
-    np.testing.assert_array_equal(seen_from(truth, -1)[0], np.array([1, 1, 1, 1, 1, 0, 1, 0, 0], bool))
+    np.testing.assert_array_equal(points_seen(truth, -1)[0], np.array([1, 1, 1, 1, 1, 0, 1, 0, 0], bool))
 
 
 def test_a_slanted_surface_does_not_hide_itself() -> None:
     slope = (np.arange(40) * 0.5 + 2).astype(np.float32)[None]
-    assert seen_from(slope, 1)[0, 5:].all()
-    assert seen_from(slope / 4, 4)[0, 5:].all()
+    assert points_seen(slope, 1)[0, 5:].all()
+    assert points_seen(slope / 4, 4)[0, 5:].all()
 
 
 def test_steps_scale_with_the_pair() -> None:
     truth = np.random.default_rng(0).uniform(0, 5, (6, 50)).astype(np.float32)
-    np.testing.assert_array_equal(seen_from(truth, 2), seen_from(truth * 2, 1))
+    np.testing.assert_array_equal(points_seen(truth, 2), points_seen(truth * 2, 1))
 
 
 def test_both_directions_are_mirror_images() -> None:
     truth = np.random.default_rng(0).uniform(0, 5, (6, 50)).astype(np.float32)  # no ties in rounding
-    np.testing.assert_array_equal(seen_from(truth, 1), seen_from(truth[:, ::-1], -1)[:, ::-1])
+    np.testing.assert_array_equal(points_seen(truth, 1), points_seen(truth[:, ::-1], -1)[:, ::-1])
 
 
 def test_jump_marks_both_sides() -> None:
@@ -118,7 +118,7 @@ def test_warping_agrees_with_exact_visibility(name: str) -> None:
     scene = SYNTHETIC.load(name, {}, None)
     steps = int(scene.pair_steps)
     exact = ~scene.visible[scene.ref][scene.ref + steps]
-    warped = ~seen_from(scene.truth[scene.ref], steps)
+    warped = ~points_seen(scene.truth[scene.ref], steps)
     assert _overlap(exact, warped) > 0.85
     assert (exact ^ warped).mean() < 0.01
 

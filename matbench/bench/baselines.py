@@ -132,7 +132,7 @@ def replaced(place: Path, baseline: Baseline) -> Baseline | None:
     return before if before.digest == baseline.digest else None
 
 
-def write(place: Path, baseline: Baseline) -> Path:
+def store_baseline(place: Path, baseline: Baseline) -> Path:
     """Store a baseline in place of what is stored of its kind of machine."""
     path = place / machine.file_name(baseline.machine)
     place.mkdir(parents=True, exist_ok=True)

@@ -72,7 +72,7 @@ def machine(growth: Growth) -> str:
     )
 
 
-def write(growth: Growth, folder: Path) -> list[Path]:
+def write_growth(growth: Growth, folder: Path) -> list[Path]:
     """``growth.csv``, ``growth.png`` and ``growth.pdf``."""
     folder.mkdir(parents=True, exist_ok=True)
     table = folder / "growth.csv"

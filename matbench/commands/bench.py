@@ -207,7 +207,7 @@ class _Judging:
             self.progress("compiling all methods without a cache")
             compilation = compile_all(self.tree).ratio
         stored = attrs.evolve(made, compilation=compilation)
-        path = baselines.write(self._folder, stored)
+        path = baselines.store_baseline(self._folder, stored)
         self.output.document |= {"stored": str(path), **attrs.asdict(stored)}
         self.output.say(f"stored: {path}")
         return DONE
@@ -368,7 +368,7 @@ def _grow(choice: Choice, seconds: float, out: Path | None, output: _Output) -> 
         output.say(f"without {one}: no time was left; --seconds gives more")
     output.document |= attrs.asdict(found)
     if out is not None:
-        for path in growth_report.write(found, out):
+        for path in growth_report.write_growth(found, out):
             output.say(f"written: {path}")
     output.close()
     return DONE

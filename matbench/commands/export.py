@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from matbench.commands.console import DONE, Console
-from matbench.results.archive import export as write
+from matbench.results.archive import export as write_archive
 
 app = App(
     name="export",
@@ -41,7 +41,7 @@ def export(
         Run folder.
     """
     console = Console()
-    place, left = write(run, out)
+    place, left = write_archive(run, out)
     if left:
         console.say(f"{left} cells of the plan are not done, and so not in the archive")
     console.say(f"archive: {place}")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from matbench.plans.plan import Cell
-    from matbench.reports.columns import Drawn
+    from matbench.reports.paper_figure import CaptionedFigure
     from matbench.runs.store import Store
     from matbench.scene import Scene
 
@@ -79,7 +79,7 @@ def slice_(
     from matbench.plans.limits import cores
     from matbench.plans.record_option import RecordOption
     from matbench.recording.probe import CapturingProbe
-    from matbench.reports import slices
+    from matbench.reports import slice_figure
     from matbench.runs.store import Store
     from matbench.solving.worker import checked, hide_truth
 
@@ -109,14 +109,14 @@ def slice_(
         hidden = hide_truth(scene)
         estimate = method.solve(hidden, Context(chosen.seed, cores(), probe))
         answer = checked(estimate, hidden)
-    plane = slices.epipolar_plane(scene, probe, estimate)
+    plane = slice_figure.epipolar_plane(scene, probe, estimate)
     if plane is None:
         raise UserError(f"{chosen.method} tells nothing of disparity space: no volume, no similarities")
     stored = _stored(store, chosen, scene)
     if stored is not None and not np.array_equal(stored, answer[scene.ref], equal_nan=True):
         console.say("the answer differs from the stored one: the code has changed since the run, or was not repeatable")
     with console.status("drawing"):
-        _write(slices.draw(scene, plane, str(chosen.method), width), stem, console)
+        _write(slice_figure.draw(scene, plane, str(chosen.method), width), stem, console)
     return DONE
 
 
@@ -154,7 +154,7 @@ def maps(
     run
         Folder of a finished run.
     """
-    from matbench.reports import maps as figure
+    from matbench.reports import map_figure
     from matbench.runs.store import Store
 
     store, console = Store(run), Console()
@@ -178,7 +178,7 @@ def maps(
             if stored is not None and stored.shape == (known.height, known.width):
                 found.setdefault((str(cell.method), cell.scene), stored)
     with console.status("drawing"):
-        drawn = figure.draw(figure.Maps(tuple(scenes[n] for n in names), tuple(methods), found), width, errors)
+        drawn = map_figure.draw(map_figure.Maps(tuple(scenes[n] for n in names), tuple(methods), found), width, errors)
         _write(drawn, stem, console)
     return DONE
 
@@ -238,8 +238,8 @@ def _stem(out: Path | None, run: Path, name: str) -> Path:
     return stem
 
 
-def _write(drawn: "Drawn", stem: Path, console: Console) -> None:
-    from matbench.reports import columns
+def _write(drawn: "CaptionedFigure", stem: Path, console: Console) -> None:
+    from matbench.reports import paper_figure
 
-    for path in columns.write(drawn, stem):
+    for path in paper_figure.write_figure(drawn, stem):
         console.say(f"{path.suffix[1:]}: {path}")

@@ -69,7 +69,7 @@ def report(
         for table in terminal.tables(results, cells, metric, higher, console.width):
             console.print(table)
         return DONE
-    text = paper.write(made, format)
+    text = paper.formatted(made, format)
     if out is None:
         sys.stdout.write(text)
     else:

@@ -13,7 +13,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench.measures.warping import picture_columns, warped
-from matbench.regions import seen_from
+from matbench.regions import points_seen
 from matbench.scene import Scene
 
 SHIFTS = (-1.0, 0.0, 1.0)  # px of the pair
@@ -102,7 +102,7 @@ def left_over(scene: Scene) -> NDArray[np.float32]:
 def _seen(scene: Scene, truth: NDArray[np.float32], view: int) -> NDArray[np.bool_]:
     """(H, W): does another view see the reference view's points? Exact where that is known; no black border."""
     exact = scene.visible.get(scene.ref) if truth is scene.truth[scene.ref] else None
-    seen = seen_from(truth, view - scene.ref) if exact is None else exact[view].copy()
+    seen = points_seen(truth, view - scene.ref) if exact is None else exact[view].copy()
     first, last = picture_columns(scene.views[scene.ref])
     seen[:, :first] = seen[:, last + 1 :] = False
     return seen

@@ -138,7 +138,7 @@ def test_tables_fit_eighty_columns() -> None:
 
 
 def test_ratios_are_stored_for_a_kind_of_machine(tmp_path: Path) -> None:
-    path = baselines.write(tmp_path, STORED)
+    path = baselines.store_baseline(tmp_path, STORED)
     assert path.name.startswith("some-processor-6-1-2-")
     assert baselines.read(tmp_path) == [STORED]
     assert baselines.matching(tmp_path, KIND, "digest") == (STORED, "")
@@ -260,7 +260,7 @@ def test_growth_is_drawn_with_the_peer_and_the_ideal(tmp_path: Path) -> None:
     text = growth_report.exponents(found).markdown() + growth_report.costs(found).markdown()
     assert "sgbm (peer)" in text
     assert "1.20 +- 0.00 (1.00)" in text
-    written = growth_report.write(found, tmp_path / "new")
+    written = growth_report.write_growth(found, tmp_path / "new")
     assert [path.name for path in written] == ["growth.csv", "growth.png", "growth.pdf"]
     assert all(path.stat().st_size > 500 for path in written)
     assert growth.chosen(["okutomi*"]) == ["okutomi_kanade", "sgbm"]
@@ -316,7 +316,7 @@ def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path)
     (first,) = json.loads(new.stdout)["times"]
     # as if it had been stored on a calmer machine: what seems slower is decided in turns
     stored = Baseline(machine.kind(), digest(), baselines.code_digest(code), {"voxel pooling": first["ratio"] / 3})
-    path = baselines.write(baselines.folder(Tree(code, Path(sys.executable), tmp_path)), stored)
+    path = baselines.store_baseline(baselines.folder(Tree(code, Path(sys.executable), tmp_path)), stored)
     assert base.last_change(code, path) is None, "no repository"
     prove.repository(code)
     unchanged = _run(code, *chosen, *judged)

@@ -9,7 +9,7 @@ import pytest
 from attrs import evolve
 
 from matbench.measures.statistics import FEW
-from matbench.reports import curves, figures, page
+from matbench.reports import curves, page, page_figures
 from matbench.reports.content import Report
 from matbench.results.sweeps import COLUMNS, Sweep
 
@@ -75,7 +75,7 @@ def test_the_figure_has_a_panel_per_region_a_curve_per_method_and_bands_where_sc
         assert [list(line.get_ydata()) for line in axes.get_lines()] == [[0, 2, 4.5], [10, 12, 14.5]]
         assert len(axes.collections) == bands
         assert len({line.get_marker() for line in axes.get_lines()}) == 2, "without colour, too"
-    text = figures.svg(figure)
+    text = page_figures.svg(figure)
     assert "&lt;b&gt;&amp;" in text
     assert "x=$1 y=_" in text
 

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from attrs import evolve
 
-from matbench.reports import figures, page, tables
+from matbench.reports import page, page_figures, tables
 from matbench.reports.content import Report
 
 
@@ -42,7 +42,7 @@ def data_of(html: str) -> Any:
 
 
 def test_one_file_without_addresses(report: Report, tmp_path: Path) -> None:
-    page.write(tmp_path / "report.html", report)
+    page.write_page(tmp_path / "report.html", report)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "http:" not in html
@@ -160,7 +160,7 @@ def test_ten_methods_on_ten_scenes_of_quarter_size_stay_below_15_MB(report: Repo
     results = pd.concat([first.assign(algorithm=m, scene=s) for m, s in both])
     cells = pd.concat([ran.assign(algorithm=m, scene=s) for m, s in both])
     before = time.process_time()
-    page.write(tmp_path / "report.html", evolve(report, results=results, cells=cells, maps=maps, scenes=scenes))
+    page.write_page(tmp_path / "report.html", evolve(report, results=results, cells=cells, maps=maps, scenes=scenes))
     size = (tmp_path / "report.html").stat().st_size
     print(f"{size / 1e6:.1f} MB, {time.process_time() - before:.1f} s of CPU time")
     assert size < 15e6
@@ -169,12 +169,12 @@ def test_ten_methods_on_ten_scenes_of_quarter_size_stay_below_15_MB(report: Repo
 def test_the_figure_takes_names_literally(report: Report) -> None:
     rows = tables.summary(report.results, report.cells)
     rows.index = ["$x^$ \x07", "<b>&", "c"]
-    figure = figures.cost(rows, "total_bad_1 all", "%")
+    figure = page_figures.cost(rows, "total_bad_1 all", "%")
     assert figure is not None
-    text = figures.svg(figure)
+    text = page_figures.svg(figure)
     assert "$x^$ \N{REPLACEMENT CHARACTER}" in text
     assert "&lt;b&gt;&amp;" in text
-    assert figures.cost(rows.assign(ranked=False), "total_bad_1 all", "%") is None
+    assert page_figures.cost(rows.assign(ranked=False), "total_bad_1 all", "%") is None
 
 
 def test_regions_over_all_views_stand_in_the_summary(report: Report) -> None:

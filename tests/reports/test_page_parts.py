@@ -14,7 +14,7 @@ from matbench.measures.metrics import total_bad
 from matbench.measures.statistics import Effect, intervals, paired_effect, paired_effects
 from matbench.measures.volumes import StoredVolume
 from matbench.regions import view_regions
-from matbench.reports import epipolar, errors, page, passes, pictures, standing, tables
+from matbench.reports import error_spread, page, page_slices, passes, pictures, standing, tables
 from matbench.reports.content import Report
 from matbench.reports.encoding import FINER, LEAST_SIDE, Coding, photograph, side_for
 from matbench.reports.numbers import Numbers
@@ -76,7 +76,7 @@ def test_pictures_that_do_not_compress_are_drawn_smaller_until_the_page_holds_th
 def test_similarity_is_highest_at_the_truth() -> None:
     scene = load_scene("synthetic/box")
     row = scene.height // 2
-    found = epipolar.similarity(scene, row)
+    found = page_slices.similarity(scene, row)
     low, high = found.ends
     planes = np.linspace(high, low, 2 * len(found.values) + 1)[1::2]
     seen = scene.scored_regions["seen_in_all"][row]
@@ -84,7 +84,7 @@ def test_similarity_is_highest_at_the_truth() -> None:
     step = planes[0] - planes[1]
     near = np.abs(best - scene.truth[scene.ref][row]) <= step
     assert near[seen].mean() > 0.9
-    outside = epipolar.similarity(
+    outside = page_slices.similarity(
         evolve(scene, views=np.zeros_like(scene.views), truth={}, regions={}, visible={}), row
     )
     assert outside.values[:, scene.width // 2].min() == 255, "all black is all alike"
@@ -97,14 +97,14 @@ def test_a_row_of_a_volume_is_that_of_the_whole_volume() -> None:
     volume = Volume(space, random.integers(0, 256, space.shape).astype(np.float32) / 255, (0, 1, 2))
     stored = StoredVolume.of(volume)
     row, ref = 17, scene.ref
-    found = epipolar.materiality(stored, scene, row)
+    found = page_slices.materiality(stored, scene, row)
     assert found is not None
     material, sight = found
     assert np.array_equal(material.values[::-1], space.in_view(stored.levels, ref)[row])
     share = np.mean([space.in_view(visibility(volume, v), ref)[row] for v in range(3)], axis=0)
     assert np.abs(sight.values[::-1].astype(float) - 255 * share).max() <= 1
     assert material.ends == ((space.first - 0.5) / 2, (space.last + 0.5) / 2)
-    assert epipolar.materiality(evolve(stored, views=(1, 2, 3)), evolve(scene, ref=0), row) is None
+    assert page_slices.materiality(evolve(stored, views=(1, 2, 3)), evolve(scene, ref=0), row) is None
 
 
 def test_the_slice_of_a_known_surface_lies_at_its_disparity() -> None:
@@ -112,7 +112,7 @@ def test_the_slice_of_a_known_surface_lies_at_its_disparity() -> None:
     truth = scene.truth[scene.ref]
     space = DisparitySpace.covering(scene.disparities, scene.n, scene.height, scene.width)
     stored = StoredVolume.of(surface(space, {scene.ref: truth}, tuple(range(scene.n))))
-    found = epipolar.materiality(stored, scene, 90)
+    found = page_slices.materiality(stored, scene, 90)
     assert found is not None
     low, high = found[0].ends
     top = np.argmax(found[0].values > 127, axis=0)
@@ -125,12 +125,12 @@ def test_spreads_are_the_scores() -> None:
     truth, random = scene.truth[scene.ref], np.random.default_rng(0)
     estimate = (truth + random.normal(0, 0.5, truth.shape)).astype(np.float32)
     estimate[::5] = np.nan
-    seeing = errors.views_seeing(scene)
+    seeing = error_spread.views_seeing(scene)
     assert seeing is not None
-    found = errors.spread(estimate, scene, seeing)
+    found = error_spread.spread(estimate, scene, seeing)
     error = np.abs(estimate.astype(np.float64) - truth.astype(np.float64)) * scene.pair_steps
     for region, mask in scene.scored_regions.items():
-        for at, threshold in enumerate(errors.THRESHOLDS):
+        for at, threshold in enumerate(error_spread.THRESHOLDS):
             if mask.any():
                 assert found.above[region][at] == pytest.approx(total_bad(error[mask], threshold))
     parts = view_regions(truth, scene.ref, scene.n, scene.visible.get(scene.ref))
@@ -203,14 +203,14 @@ def test_costs_are_those_of_the_printed_tables(report: Report) -> None:
 def test_curves_against_the_threshold_go_through_the_tables_means() -> None:
     scenes = ("a[noise=0]", "a[noise=9]", "b")
     scope = tables.Shared(("m",), scenes, {"m": frozenset(scenes)}, scenes)
-    size = len(errors.THRESHOLDS)
+    size = len(error_spread.THRESHOLDS)
     spreads = {
-        ("m", s): errors.Spread({"all": np.full(size, v)}, {1: v}, 2)
+        ("m", s): error_spread.Spread({"all": np.full(size, v)}, {1: v}, 2)
         for s, v in zip(scenes, (10.0, 20.0, 60.0), strict=True)
     }
     table = pd.DataFrame({"m": [10.0, 20.0, 60.0]}, index=list(scenes))
     (mean,) = tables.over_scenes(table, scope)
-    for figure in (errors.thresholds(spreads, scope), errors.by_views(spreads, scope)[0]):
+    for figure in (error_spread.thresholds(spreads, scope), error_spread.by_views(spreads, scope)[0]):
         assert figure is not None
         assert set(figure.axes[0].lines[0].get_ydata()) == {mean}
 

@@ -50,7 +50,7 @@ def from_tex(text: str) -> list[list[str]]:
 
 def test_all_formats_have_the_same_numbers_in_the_same_places(report: Report) -> None:
     sheet = made(awkward(report))
-    found = {f: paper.write(sheet, f) for f in paper.FORMATS}
+    found = {f: paper.formatted(sheet, f) for f in paper.FORMATS}
     rows = {"csv": from_csv(found["csv"]), "md": from_md(found["md"]), "tex": from_tex(found["tex"])}
     assert len(rows["csv"]) == 9, "three methods: their means and two scenes"
     numbers = {

@@ -17,7 +17,7 @@ from matbench.plans.record_option import RecordOption
 from matbench.plans.settings import Settings
 from matbench.recording import coloring, reduction
 from matbench.recording.probe import CapturingProbe
-from matbench.reports import columns, maps, slices
+from matbench.reports import map_figure, paper_figure, slice_figure
 from matbench.runs.store import Store
 from matbench.scene import Range, Scene
 from matbench.space import visibility
@@ -53,10 +53,10 @@ def test_a_slice_is_drawn_from_a_second_solve(run: Path, capsys: pytest.CaptureF
     box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \]", pdf)
     assert box
     assert float(box[1]) == pytest.approx(3.25 * 72, abs=1)
-    assert float(box[2]) < columns.TALLEST * 72
+    assert float(box[2]) < paper_figure.TALLEST * 72
     picture = cv2.imread(str(tmp_path / "two.png"))
     assert picture is not None
-    assert picture.shape[1] == pytest.approx(3.25 * columns.DOTS, abs=2)
+    assert picture.shape[1] == pytest.approx(3.25 * paper_figure.DOTS, abs=2)
     caption = (tmp_path / "two.txt").read_text()
     for told in ("row 20", SMALL, "materiality[preset=paper passes=3]", "after 3 passes", "px per view step", "(f)"):
         assert told in caption
@@ -79,7 +79,7 @@ def test_slices_are_the_arrays_told() -> None:
 
     probe = Both(RecordOption(rows=(20,)))
     estimate = method.solve(scene, Context(0, 1, probe))
-    plane = slices.epipolar_plane(scene, probe, estimate)
+    plane = slice_figure.epipolar_plane(scene, probe, estimate)
     assert plane is not None
     assert estimate.volume is not None
     pictures = {one.name: one.picture for one in plane.slices}
@@ -89,7 +89,7 @@ def test_slices_are_the_arrays_told() -> None:
     assert np.array_equal(pictures["materiality"][:, :, 1], reduction.as_bytes(estimate.volume.values[20]))
     seen = reduction.as_bytes(visibility(estimate.volume, 0)[20])
     assert np.array_equal(pictures["visibility"][:, :, 0], seen)
-    drawn = slices.draw(scene, plane, "m")
+    drawn = slice_figure.draw(scene, plane, "m")
     top = [axis.images[0].get_array() for axis in drawn.figure.axes[:2]]
     assert np.array_equal(top[0], scene.views[scene.ref])
     assert np.array_equal(drawn.figure.axes[4].images[0].get_array(), pictures["materiality"][::-1])
@@ -107,7 +107,7 @@ def test_maps_are_those_of_the_run(run: Path, capsys: pytest.CaptureFixture[str]
     scene, store = load_scene(SMALL), Store(run)
     cell = next(c for c in store.plan().cells if c.method.algorithm == "okutomi_kanade")
     stored = store.disparity(cell)[scene.ref]
-    drawn = maps.draw(maps.Maps((scene,), ("ok",), {("ok", SMALL): stored}))
+    drawn = map_figure.draw(map_figure.Maps((scene,), ("ok",), {("ok", SMALL): stored}))
     shown = [axis.images[0].get_array() for axis in drawn.figure.axes]
     ends = coloring.disparity_ends(scene)
     assert np.array_equal(shown[0], scene.views[scene.ref])
@@ -124,22 +124,24 @@ def made(name: str, truth: bool = True) -> Scene:
 def test_many_scenes_go_on_in_the_next_line_until_the_page_is_full() -> None:
     scenes = tuple(made(f"made/{i}") for i in range(6))
     found = {("m", scene.name): scene.truth[0] for scene in scenes[1:]}
-    drawn = maps.draw(maps.Maps(scenes, ("m",), found))
+    drawn = map_figure.draw(map_figure.Maps(scenes, ("m",), found))
     assert len(drawn.figure.axes) == 18
     assert drawn.figure.get_figwidth() == 3.25
     assert "Without a map: m on made/0." in drawn.caption
     assert [text.get_text() for text in drawn.figure.texts].count("(c)") == 2
     with pytest.raises(UserError, match="more than a page holds"):
-        maps.draw(maps.Maps(scenes, tuple("abcdefghijklmnop"), {}), errors=True)
+        map_figure.draw(map_figure.Maps(scenes, tuple("abcdefghijklmnop"), {}), errors=True)
 
 
 def test_hostile_names_are_only_letters(tmp_path: Path) -> None:
     scene = made("made/$x$_^{\\a}%<b>", truth=False)
-    drawn = maps.draw(maps.Maps((scene,), ("$m_1",), {("$m_1", scene.name): np.zeros((16, 24), np.float32)}))
-    paths = columns.write(drawn, tmp_path / "f")
+    drawn = map_figure.draw(
+        map_figure.Maps((scene,), ("$m_1",), {("$m_1", scene.name): np.zeros((16, 24), np.float32)})
+    )
+    paths = paper_figure.write_figure(drawn, tmp_path / "f")
     assert [path.suffix for path in paths] == [".pdf", ".png", ".txt", ".tex"]
     assert r"\$m\_1" in paths[3].read_text()
-    again = columns.write(drawn, tmp_path / "g")
+    again = paper_figure.write_figure(drawn, tmp_path / "g")
     assert paths[0].read_bytes() == again[0].read_bytes()
 
 

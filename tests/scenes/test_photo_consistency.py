@@ -9,7 +9,7 @@ from scene_files import Layers
 
 from matbench import load_scene
 from matbench.measures.warping import picture_columns, warped
-from matbench.regions import seen_from
+from matbench.regions import points_seen
 from matbench.scene import Range, Scene
 from matbench.scenes.photo_consistency import left_over, together, warping_errors
 
@@ -61,7 +61,7 @@ def test_errors_are_the_mean_and_median_over_seen_pixels() -> None:
     for view, error in warping_errors(scene, shifts=shifts).items():
         steps = view - 2
         pictures = [warped(scene.views[view], truth + np.float32(shift), steps) for shift in shifts]
-        seen = seen_from(truth, steps) & ~np.isnan(pictures).any(axis=(0, 3))
+        seen = points_seen(truth, steps) & ~np.isnan(pictures).any(axis=(0, 3))
         for k, picture in enumerate(pictures):
             difference = np.abs(picture - scene.views[2])[seen].mean(axis=1)
             assert error.mean[k] == pytest.approx(difference.mean(), rel=1e-5)

@@ -40,7 +40,7 @@ _LOOK = {
 
 
 @frozen(eq=False)
-class Drawn:
+class CaptionedFigure:
     """A figure and what stands below it.
 
     Parameters
@@ -72,7 +72,7 @@ def letter(number: int) -> str:
     return (letter(number // 26 - 1) if number >= 26 else "") + chr(ord("a") + number % 26)
 
 
-def write(drawn: Drawn, stem: Path) -> list[Path]:
+def write_figure(drawn: CaptionedFigure, stem: Path) -> list[Path]:
     """Write a figure as PDF and PNG, its caption as text, and what a paper includes as LaTeX; the four paths."""
     paths = [stem.with_name(stem.name + ending) for ending in (".pdf", ".png", ".txt", ".tex")]
     for path in paths[:2]:
@@ -86,7 +86,7 @@ def write(drawn: Drawn, stem: Path) -> list[Path]:
     return paths
 
 
-def _include(drawn: Drawn, name: str) -> str:
+def _include(drawn: CaptionedFigure, name: str) -> str:
     width = drawn.figure.get_figwidth()
     kind = "figure" if width <= INCHES["column"] else "figure*"
     label = re.sub("[^A-Za-z0-9]+", "-", name).strip("-")

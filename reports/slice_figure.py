@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from matbench.algorithm import Estimate
 from matbench.recording import coloring, reduction
 from matbench.recording.probe import CapturingProbe
-from matbench.reports.columns import INCHES, Drawn, Width, letter, look
+from matbench.reports.paper_figure import INCHES, CaptionedFigure, Width, letter, look
 from matbench.scene import Scene
 from matbench.space import DisparitySpace
 
@@ -21,7 +21,7 @@ SLICE_HEIGHT = 0.55  # inches, in a column
 
 
 @frozen(eq=False)
-class Slice:
+class FigureSlice:
     """One kind of slice.
 
     Parameters
@@ -56,7 +56,7 @@ class EpipolarPlane:
     row: int
     space: DisparitySpace
     views: tuple[int, ...]
-    slices: tuple[Slice, ...]
+    slices: tuple[FigureSlice, ...]
     passes: int
 
     @property
@@ -71,19 +71,21 @@ def epipolar_plane(scene: Scene, probe: CapturingProbe, estimate: Estimate) -> E
     Slices are those of the last pass.
     """
     (row, *_), labels = probe.wanted.rows, scene.labels
-    found: list[Slice] = []
+    found: list[FigureSlice] = []
     similarity, volume = probe.similarity(labels), estimate.volume
     if similarity is not None:
-        found.append(Slice("similarity", similarity.picture[0], f"similarity of the pairs {_named(similarity.names)}"))
+        found.append(
+            FigureSlice("similarity", similarity.picture[0], f"similarity of the pairs {_named(similarity.names)}")
+        )
     if volume is not None:
         seen = probe.visibility(volume, labels)
-        found.append(Slice("visibility", seen.picture[0], f"visibility in the views {_named(seen.names)}"))
+        found.append(FigureSlice("visibility", seen.picture[0], f"visibility in the views {_named(seen.names)}"))
         grey = reduction.as_bytes(probe.slices_of(volume).values[0])
-        found.append(Slice("materiality", np.repeat(grey[:, :, None], 3, axis=2), "materiality, white is high"))
+        found.append(FigureSlice("materiality", np.repeat(grey[:, :, None], 3, axis=2), "materiality, white is high"))
     slopes = next((f.derivative for f in reversed(probe.frames) if f.derivative is not None), None)
     if slopes is not None:
         meaning = "energy derivative according to materiality: red negative, blue positive, black zero"
-        found.append(Slice("energy derivative", reduction.sign_colors(slopes[0]), meaning))
+        found.append(FigureSlice("energy derivative", reduction.sign_colors(slopes[0]), meaning))
     where = volume or probe.latest
     if not found or where is None:
         return None
@@ -98,7 +100,7 @@ def _named(names: tuple[str, ...]) -> str:
     return ", ".join(colored)
 
 
-def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column") -> Drawn:
+def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column") -> CaptionedFigure:
     """Reference view, truth, and the slices of one row, one below the other.
 
     Parameters
@@ -131,7 +133,7 @@ def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column
         f"{letters}. Disparities {first:.4g} to {last:.4g} px per view step, the nearest on top; columns in px of "
         f"view {scene.labels[plane.views[0]]}, beyond its frame too."
     )
-    return Drawn(figure, caption)
+    return CaptionedFigure(figure, caption)
 
 
 def _top(figure: Any, scene: Scene, row: int, truth: NDArray[np.float32] | None) -> list[str]:
@@ -151,7 +153,7 @@ def _top(figure: Any, scene: Scene, row: int, truth: NDArray[np.float32] | None)
     return [pictures[0][2] + f", row {row} in yellow", *(meaning for _, _, meaning in pictures[1:])]
 
 
-def _draw_slice(axis: "Axes", plane: EpipolarPlane, one: Slice, title: str) -> None:
+def _draw_slice(axis: "Axes", plane: EpipolarPlane, one: FigureSlice, title: str) -> None:
     space, half = plane.space, 0.5 / plane.space.fineness
     left = space.origin / space.fineness
     low, high = (float(d) / plane.step for d in space.disparities[[0, -1]])

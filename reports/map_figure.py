@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from matbench.errors import UserError
 from matbench.recording import coloring
-from matbench.reports.columns import INCHES, TALLEST, Drawn, Width, letter, look
-from matbench.reports.figures import printable
+from matbench.reports.page_figures import printable
+from matbench.reports.paper_figure import INCHES, TALLEST, CaptionedFigure, Width, letter, look
 from matbench.scene import Scene
 from matbench.spec import read_scene
 
@@ -39,7 +39,7 @@ class Maps:
     disparity: Mapping[tuple[str, str], NDArray[np.float32]]
 
 
-def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
+def draw(maps: Maps, width: Width = "column", errors: bool = False) -> CaptionedFigure:
     """Reference views, truths and maps, one scene a column; with `errors` also the errors of each map.
 
     Raises
@@ -90,7 +90,7 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
                     rotation=90,
                 )
             below -= len(rows) * (height + 0.03) + 0.04
-    return Drawn(figure, _caption(maps, rows))
+    return CaptionedFigure(figure, _caption(maps, rows))
 
 
 def _rows(maps: Maps, errors: bool) -> list[tuple[str, str, str]]:

@@ -8,8 +8,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench.measures.metrics import TIE, error_map
-from matbench.regions import seen_from
-from matbench.reports import figures
+from matbench.regions import points_seen
+from matbench.reports import page_figures
 from matbench.reports.tables import REGIONS, Shared
 from matbench.scene import Scene
 
@@ -35,7 +35,7 @@ def views_seeing(scene: Scene) -> Counts | None:
         return None
     exact = scene.visible.get(scene.ref)
     others = [view for view in range(scene.n) if view != scene.ref]
-    seen = [seen_from(truth, view - scene.ref) if exact is None else exact[view] for view in others]
+    seen = [points_seen(truth, view - scene.ref) if exact is None else exact[view] for view in others]
     count: Counts = np.where(np.isfinite(truth), 1 + np.sum(seen, axis=0), 0)
     return count
 
@@ -98,7 +98,7 @@ def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
             if parts:
                 curves[method] = (THRESHOLDS, np.mean(parts, axis=0))
         panels.append((region, curves))
-    return figures.panels(panels, "threshold, px of the pair", "pixels above it, %", every=6)
+    return page_figures.panels(panels, "threshold, px of the pair", "pixels above it, %", every=6)
 
 
 def by_views(spreads: Spreads, scope: Shared) -> "tuple[Figure | None, list[str]]":
@@ -118,4 +118,4 @@ def by_views(spreads: Spreads, scope: Shared) -> "tuple[Figure | None, list[str]
         panels.append((f"{count} views, {len(scenes)} scene{'s' if len(scenes) != 1 else ''}", curves))
         partly = [k for k in places if sum(k in shared[s].by_views for s in scenes) < len(scenes)]
         said += [f"{count} views: not every scene has pixels seen by {', '.join(map(str, partly))}."] if partly else []
-    return figures.panels(panels, "views that see the pixel", "total_bad_1, %", backwards=True), said
+    return page_figures.panels(panels, "views that see the pixel", "total_bad_1, %", backwards=True), said

@@ -21,7 +21,7 @@ _ROWS, _COLUMNS = 1, 2  # how far the window reaches up and down, left and right
 
 
 @frozen(eq=False)
-class Slice:
+class PageSlice:
     """One epipolar plane as a picture, the nearest disparity on top.
 
     Parameters
@@ -42,7 +42,7 @@ def rows_of(scene: Scene, asked: Sequence[int]) -> list[int]:
     return list(dict.fromkeys([*wanted, scene.height // 2, scene.height // 4, 3 * scene.height // 4]))
 
 
-def similarity(scene: Scene, row: int) -> Slice:
+def similarity(scene: Scene, row: int) -> PageSlice:
     """How alike neighbouring views are at each disparity of a row.
 
     exp(-SSD / (2 `SPREAD`²)) with the mean squared difference of colours in a window of 3 rows and 5
@@ -67,7 +67,7 @@ def similarity(scene: Scene, row: int) -> Slice:
             pairs += both
         before = here
     half = (largest - least) / (count - 1) / 2 if largest > least else 0.5
-    return Slice(as_bytes(total / np.maximum(pairs, 1)), (least - half, largest + half))
+    return PageSlice(as_bytes(total / np.maximum(pairs, 1)), (least - half, largest + half))
 
 
 def _sampled(line: NDArray[np.float32], places: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -76,7 +76,7 @@ def _sampled(line: NDArray[np.float32], places: NDArray[np.float32]) -> NDArray[
     return np.asarray(sampled, np.float32)
 
 
-def materiality(stored: StoredVolume, scene: Scene, row: int) -> tuple[Slice, Slice] | None:
+def materiality(stored: StoredVolume, scene: Scene, row: int) -> tuple[PageSlice, PageSlice] | None:
     """A row of a volume, and the share of its views that see each point past what is nearer (equation 3).
 
     None where the volume does not span the reference view or the row.
@@ -89,4 +89,4 @@ def materiality(stored: StoredVolume, scene: Scene, row: int) -> tuple[Slice, Sl
     step = (stored.views[1] - stored.views[0]) * space.fineness  # samples to a pixel per view step of the scene
     ends = (space.first - 0.5) / step, (space.last + 0.5) / step
     material, sight = (space.in_view(v, ref)[0, ::-1].astype(np.float32) for v in (volume.values, seen))
-    return Slice(as_bytes(material), ends), Slice(as_bytes(sight), ends)
+    return PageSlice(as_bytes(material), ends), PageSlice(as_bytes(sight), ends)
