@@ -114,7 +114,7 @@ def _where(error: BaseException) -> str:
 
 def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Path], trial: Trial, log: Path) -> None:
     """Have a process below this one solve a trial, send its answer, and end it with all that it has started."""
-    processes.stand_apart()  # Ctrl-C is for whoever holds the line
+    processes.lead_own_session()  # Ctrl-C is for whoever holds the line
     answers, theirs = Pipe(duplex=False)
     watcher, pid = os.getpid(), os.fork()
     if not pid:
@@ -134,7 +134,7 @@ def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Pat
         with suppress(OSError):  # nobody wants it any more
             line.send(_heard(answers, line, pid, timeout))
     finally:
-        processes.end_all_below()
+        processes.kill_descendants()
 
 
 def _heard(answers: Connection, line: Connection, pid: int, timeout: float) -> Answer:

@@ -37,7 +37,7 @@ from matbench.solving.worker import Job
 from matbench.spec import first_line
 
 _PATIENCE = "10s"  # to reach the scheduler
-_LOOK = 0.2  # seconds between two looks at whether a task is still wanted
+_TICK = 0.2  # seconds between two looks at whether a task is still wanted
 
 
 @frozen
@@ -73,7 +73,7 @@ class Reply:
     declined: str = ""
 
 
-def work(
+def run_cells(
     plan: Plan,
     store: Store,
     settings: Settings,
@@ -114,8 +114,8 @@ def work(
                 tell("done", cell, outcome)
 
         def submit(task: Task, before: list[Reply]) -> None:
-            chosen = {"workers": _others(client, before), "allow_other_workers": True} if before else {}
-            future = client.submit(solve, task, key=(this_run, task.cell.key, len(before)), pure=False, **chosen)
+            chosen = {"workers": _other_workers(client, before), "allow_other_workers": True} if before else {}
+            future = client.submit(solve_task, task, key=(this_run, task.cell.key, len(before)), pure=False, **chosen)
             tasks[future.key], futures[future.key] = (task, before), future
             arriving.add(future)
 
@@ -126,17 +126,17 @@ def work(
             for future, reply in arriving:
                 task, before = tasks.pop(future.key)
                 del futures[future.key]
-                if future.status == "finished" and reply.declined and _others(client, [*before, reply]):
+                if future.status == "finished" and reply.declined and _other_workers(client, [*before, reply]):
                     submit(task, [*before, reply])
                     continue
-                ends(task.cell, _arrived(store, task.cell, future, reply, before))
+                ends(task.cell, _keep_reply(store, task.cell, future, reply, before))
         finally:
             with telling:
                 waiting.clear()
             client.cancel(list(futures.values()), force=True)
 
 
-def _others(client: Any, declined: Sequence[Reply]) -> list[str]:
+def _other_workers(client: Any, declined: Sequence[Reply]) -> list[str]:
     """The workers that have not declined; none once one of them has declined twice."""
     tried = [reply.worker for reply in declined]
     if len(set(tried)) < len(tried):
@@ -144,7 +144,7 @@ def _others(client: Any, declined: Sequence[Reply]) -> list[str]:
     return [worker for worker in client.scheduler_info(n_workers=-1)["workers"] if worker not in tried]
 
 
-def _arrived(store: Store, cell: Cell, future: Any, reply: Any, before: Sequence[Reply]) -> Outcome:
+def _keep_reply(store: Store, cell: Cell, future: Any, reply: Any, before: Sequence[Reply]) -> Outcome:
     """Put what came in its place, or say why nothing came."""
     wrong = Outcome("failed", alone=False)
     if future.status == "finished" and not reply.declined:
@@ -199,15 +199,15 @@ def _client(settings: Settings) -> Iterator[Any]:
 # on the workers
 
 
-def solve(task: Task) -> Reply:
+def solve_task(task: Task) -> Reply:
     """Solve a cell on a Dask worker."""
     from distributed import get_worker
 
     worker = get_worker()
     with TemporaryDirectory(prefix="matbench-") as folder:
-        files = _written(task.files, Path(folder))
-        root = _data(task.settings.data)
-        why = _unlike(task.cell, files, root)
+        files = _write_files(task.files, Path(folder))
+        root = _data_folder(task.settings.data)
+        why = _why_declined(task.cell, files, root)
         if why:
             return Reply(worker.address, declined=why)
         worker.log_event(task.run, task.cell.key)
@@ -221,23 +221,23 @@ def solve(task: Task) -> Reply:
         store = Store(Path(folder) / "run")
         (store.folder / "cells").mkdir(parents=True)
         job = Job(store.folder, task.cell, files, settings.threads_each(), settings, alone=False)
-        outcome = _solved(job, worker, worker.get_current_task())
+        outcome = _have_solved(job, worker, worker.get_current_task())
         if not store.cell(task.cell).exists():
             return Reply(worker.address, declined=outcome.reason)
         return Reply(worker.address, parcels.pack(store.cell(task.cell)))
 
 
-def _solved(job: Job, worker: Any, key: Any) -> Outcome:
+def _have_solved(job: Job, worker: Any, key: Any) -> Outcome:
     """Have a keeper solve a cell; it is dismissed where nobody wants the cell any more."""
     keeper = _keepers.get()
     lives = False
     try:
-        keeper.take(job)
-        while not keeper.line.poll(_LOOK):
+        keeper.begin(job)
+        while not keeper.line.poll(_TICK):
             wanted = worker.state.tasks.get(key)
             if wanted is None or wanted.state != "executing":
                 return Outcome("interrupted", reason="nobody wants it any more")
-        outcome, lives = keeper.done(job)
+        outcome, lives = keeper.outcome(job)
         return outcome
     finally:
         if lives:
@@ -259,10 +259,10 @@ class Keepers:
         with suppress(Empty):
             return self.free.get_nowait()
         from matbench.runs.provenance import commit_known
-        from matbench.solving.environment import kernels_kept, without_main
+        from matbench.solving.environment import kernel_cache_in_use, without_main
 
         # Dask's workers are daemons, which may have no children lest they leave orphans; keepers end with their parent
-        with self.starting, without_main(), kernels_kept(), commit_known():
+        with self.starting, without_main(), kernel_cache_in_use(), commit_known():
             config = current_process()._config  # type: ignore[attr-defined]
             before = config.get("daemon")
             config["daemon"] = False
@@ -287,7 +287,7 @@ _keepers = Keepers(SimpleQueue(), Lock())
 atexit.register(_keepers.dismiss)
 
 
-def _written(files: Sequence[tuple[str, bytes]], folder: Path) -> tuple[str, ...]:
+def _write_files(files: Sequence[tuple[str, bytes]], folder: Path) -> tuple[str, ...]:
     """The paths of users' files as they came, each in a folder of its own; their names count in digests."""
     paths = []
     for number, (name, content) in enumerate(files):
@@ -300,7 +300,7 @@ def _written(files: Sequence[tuple[str, bytes]], folder: Path) -> tuple[str, ...
     return tuple(paths)
 
 
-def _data(named: Path | None) -> Path | None:
+def _data_folder(named: Path | None) -> Path | None:
     """This worker's folder of real scenes: its own, else the one named by whoever asks, if it is here."""
     with suppress(UserError):
         own = data_root()
@@ -309,7 +309,7 @@ def _data(named: Path | None) -> Path | None:
     return named if named is not None and named.is_dir() else None
 
 
-def _unlike(cell: Cell, files: Sequence[str], root: Path | None) -> str:
+def _why_declined(cell: Cell, files: Sequence[str], root: Path | None) -> str:
     """Why this worker would solve something else: it has other code, or not the scene; empty if it would not."""
     name, known = cell.method.algorithm, plugins.installed("algorithms")
     candidates = [plugins.Plugin(name, file, object) for file in files]
@@ -317,26 +317,28 @@ def _unlike(cell: Cell, files: Sequence[str], root: Path | None) -> str:
     if not candidates:
         return f"the worker has no method {name}: install what offers it there"
     try:
-        is_same = cell.method.code in map(plugins.code_digest, candidates) or cell.method.code == _code(cell, files)
+        is_same = cell.method.code in map(plugins.code_digest, candidates) or cell.method.code == _code_digest(
+            cell, files
+        )
     except (ImportError, OSError, UserError) as error:
         return f"the worker cannot use {name}: {first_line(error)}"
     if not is_same:
         return f"the worker has other code of {name}, or other versions of numpy, numba or OpenCV: install the same"
     try:
-        if _digest(cell.scene, root) != cell.scene_digest:
+        if _scene_digest(cell.scene, root) != cell.scene_digest:
             return f"the worker's {cell.scene} is another one: give all workers the same data"
     except Exception as error:
         return f"the worker has not {cell.scene}: {first_line(error)}"
     return ""
 
 
-def _code(cell: Cell, files: Sequence[str]) -> str:
+def _code_digest(cell: Cell, files: Sequence[str]) -> str:
     """The digest of a cell's method, and of the files that it names: to know these, the method is imported."""
     plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in files])
     return plugins.method_digest(plugin, spec.build(plugin.name, plugin.load(), cell.method.params))
 
 
 @cache
-def _digest(scene: str, root: Path | None) -> str:
+def _scene_digest(scene: str, root: Path | None) -> str:
     """A scene's digest on this machine."""
     return load_scene(scene, root).digest

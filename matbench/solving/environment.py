@@ -21,7 +21,7 @@ def without_main() -> Iterator[None]:
 
 
 @contextmanager
-def kernels_kept() -> Iterator[None]:
+def kernel_cache_in_use() -> Iterator[None]:
     """Let the processes started meanwhile keep compiled kernels where no other code's are."""
     before = os.environ.get("NUMBA_CACHE_DIR")
     with suppress(OSError):  # without a folder to keep them in, kernels are compiled anew

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 LOG_ENDS = 1 << 16  # bytes kept of the beginning, and of the end, of what a cell prints
 _TICK = 0.05  # seconds between two looks at a process
 _TREE_LOOKS = 10  # every so many looks also at those that it started
-_LAST_WORDS = 0.5  # seconds that a process which is ended has to say where it was
+_STACK_SECONDS = 0.5  # seconds that a process which is ended has to say where it was
 _PATIENCE = 5.0  # seconds that a keeper has to clear away
 
 
@@ -158,29 +158,29 @@ def keep(inbox: Connection) -> None:
     """Solve the cells of the jobs that come in, one by one; send "" after each, or why it could not be written."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit())
-    processes.stand_apart()  # Ctrl-C is for whoever holds the line
+    processes.lead_own_session()  # Ctrl-C is for whoever holds the line
     child: Child | None = None
     try:
         while True:
             job = inbox.recv()
             try:
-                child = _cell(job, inbox, child)
+                child = _solve_cell(job, inbox, child)
                 said = ""
             except (OSError, ValueError) as error:  # the disk is full, say
-                processes.end_all_below()
+                processes.kill_descendants()
                 child, said = None, str(error)
             inbox.send(said)
     except (EOFError, BrokenPipeError, ConnectionResetError, Dismissed):
         pass
     finally:
-        processes.end_all_below()
+        processes.kill_descendants()
 
 
-def _cell(job: Job, inbox: Connection, child: Child | None) -> Child | None:
+def _solve_cell(job: Job, inbox: Connection, child: Child | None) -> Child | None:
     """Solve a cell; the child, if it is to solve the next one, too."""
     store = Store(job.run)
     if child is not None and not child.suits(job):
-        processes.end_all_below()
+        processes.kill_descendants()
         child.close()
         child = None
     with store.building(job.cell) as draft:
@@ -204,7 +204,7 @@ def _attempt(job: Job, draft: Path, inbox: Connection, child: Child) -> bool | N
         stays = outcome is None and child.is_fit and job.settings.isolation == "shared"
     finally:
         if not stays:
-            processes.end_all_below()
+            processes.kill_descendants()
         log.drain()
         if not stays:
             child.close()
@@ -260,21 +260,21 @@ def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> 
                     return None
         if child.pid in (ended := processes.reap()):
             log.drain()
-            return _ended(ended[child.pid], log, kills)
+            return _how_it_ended(ended[child.pid], log, kills)
         now = time.monotonic()
         if limit is not None and now - begin > limit:
-            _last_words(child, log)
+            _print_stack(child, log)
             return Outcome("timeout", reason=f"stopped after {limit:g} s")
         if now < next_look:
             continue
         looks, next_look = looks + 1, now + _TICK
-        used = processes.used(child.pid, whole_tree=looks % _TREE_LOOKS == 0)
+        used = processes.memory_used(child.pid, whole_tree=looks % _TREE_LOOKS == 0)
         if used > memory:
-            _last_words(child, log)
+            _print_stack(child, log)
             return Outcome("out-of-memory", reason=f"stopped: it held {used:.0f} MiB, {memory} MiB are its limit")
 
 
-def _ended(status: int, log: Log, kills: int) -> Outcome:
+def _how_it_ended(status: int, log: Log, kills: int) -> Outcome:
     """What became of a child that has ended by itself, or was ended by the system."""
     code = os.waitstatus_to_exitcode(status)
     if b"std::bad_alloc" in log:
@@ -288,11 +288,11 @@ def _ended(status: int, log: Log, kills: int) -> Outcome:
     return Outcome("crashed", reason=f"the method's process was ended by a signal ({words}{name})")
 
 
-def _last_words(child: Child, log: Log) -> None:
+def _print_stack(child: Child, log: Log) -> None:
     """Have the child print where it is (`faulthandler`)."""
     with suppress(ProcessLookupError):
         os.kill(child.pid, signal.SIGABRT)
-    end = time.monotonic() + _LAST_WORDS
+    end = time.monotonic() + _STACK_SECONDS
     while time.monotonic() < end and child.pid not in processes.reap():
         wait([child.output], _TICK)
         log.drain()
@@ -308,12 +308,12 @@ class Keeper:
         self._process.start()
         theirs.close()
 
-    def take(self, job: Job) -> None:
+    def begin(self, job: Job) -> None:
         """Begin with a cell; `line` tells when there is an answer."""
-        with suppress(ConnectionError):  # `done` says so
+        with suppress(ConnectionError):  # `outcome` says so
             self.line.send(job)
 
-    def done(self, job: Job) -> tuple[Outcome, bool]:
+    def outcome(self, job: Job) -> tuple[Outcome, bool]:
         """What has become of the cell, and whether this keeper can go on."""
         wrong = Outcome("failed", threads=job.threads, alone=job.alone)
         try:

@@ -13,7 +13,7 @@ from matbench.solving import processes
 from matbench.solving.check_scenes import trials
 from matbench.solving.check_solve import Answer, solve_apart
 from matbench.solving.check_verdicts import CheckResult, judge
-from matbench.solving.environment import kernels_kept, without_main
+from matbench.solving.environment import kernel_cache_in_use, without_main
 
 
 def check(
@@ -36,7 +36,7 @@ def check(
     entry = plugins.algorithm(method.algorithm, files).entry
     wanted, answers = trials(), {}
     module = [] if isinstance(entry, type) else [entry.module]
-    with without_main(), kernels_kept():
+    with without_main(), kernel_cache_in_use():
         processes.start_server(["matbench.solving.method_check", *module])
         for done, (name, trial) in enumerate(wanted.items()):
             if listen is not None:

@@ -18,7 +18,7 @@ _DEATH_SIGNAL, _CHILD_SUBREAPER = 1, 36  # prctl(2)
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
 
-def used(pid: int, whole_tree: bool = True) -> float:
+def memory_used(pid: int, whole_tree: bool = True) -> float:
     """MiB of resident memory of a process and all below it; what they share counts once.
 
     A process that has just ended has none.
@@ -28,12 +28,12 @@ def used(pid: int, whole_tree: bool = True) -> float:
         tree = [process, *(process.children(recursive=True) if whole_tree else ())]
         if len(tree) == 1:
             return float(process.memory_info().rss / _MIB)
-        return sum(_share(one) for one in tree) / _MIB
+        return sum(_proportional_size(one) for one in tree) / _MIB
     except psutil.Error:
         return 0.0
 
 
-def _share(process: psutil.Process) -> int:
+def _proportional_size(process: psutil.Process) -> int:
     with suppress(psutil.Error, AttributeError):
         return int(process.memory_full_info().pss)
     with suppress(psutil.Error):
@@ -103,7 +103,7 @@ def start_server(preload: Iterable[str]) -> None:
             os.environ["PYTHONWARNINGS"] = warnings
 
 
-def stand_apart() -> None:
+def lead_own_session() -> None:
     """Lead a session, which Ctrl-C does not reach, and adopt what the processes below leave behind (Linux)."""
     os.setsid()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # `start_server` has it blocked
@@ -122,7 +122,7 @@ def _prctl(option: int, value: int) -> None:
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
-def end_all_below() -> None:
+def kill_descendants() -> None:
     """Kill every process below this one, and those that they start meanwhile, and wait until they are gone."""
     for _ in range(1000):
         below = psutil.Process().children(recursive=True)

@@ -10,7 +10,7 @@ from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
 from matbench.runs.store import Outcome, Store, write_cell
 from matbench.runs.todo import pending
-from matbench.solving.environment import kernels_kept, without_main
+from matbench.solving.environment import kernel_cache_in_use, without_main
 from matbench.solving.keeper import Keeper, dismiss
 from matbench.solving.worker import Job
 
@@ -58,16 +58,16 @@ def run(
     if not todo:
         return
     store.sweep()
-    with without_main(), kernels_kept():
+    with without_main(), kernel_cache_in_use():
         if settings.dask is None:
-            _here(plan, store, settings, preload, todo, tell)
+            _run_here(plan, store, settings, preload, todo, tell)
         else:
             from matbench.solving import cluster
 
-            cluster.work(plan, store, settings, todo, tell)
+            cluster.run_cells(plan, store, settings, todo, tell)
 
 
-def _datasets(cells: Iterable[Cell]) -> list[str]:
+def _dataset_modules(cells: Iterable[Cell]) -> list[str]:
     """The modules that load the cells' scenes."""
     known = plugins.installed("datasets")
     prefixes = dict.fromkeys(cell.scene.partition("/")[0] for cell in cells)
@@ -75,7 +75,7 @@ def _datasets(cells: Iterable[Cell]) -> list[str]:
     return [entry.module for entry in entries if not isinstance(entry, type)]
 
 
-def _here(
+def _run_here(
     plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Iterable[Cell], tell: Listener
 ) -> None:
     """Share out cells to keepers on this machine."""
@@ -84,7 +84,7 @@ def _here(
         for cell in todo
     ]
     waiting = deque(jobs)
-    preload = [*preload, *_datasets(job.cell for job in jobs)]
+    preload = [*preload, *_dataset_modules(job.cell for job in jobs)]
     free: list[Keeper] = []
     busy: dict[Any, tuple[Keeper, Job]] = {}
     try:
@@ -93,11 +93,11 @@ def _here(
             while waiting and free:
                 keeper, job = free.pop(), waiting.popleft()
                 busy[keeper.line] = keeper, job
-                keeper.take(job)
+                keeper.begin(job)
                 tell("start", job.cell, None)
             for line in wait(list(busy)):
                 keeper, job = busy[line]
-                outcome, lives = keeper.done(job)
+                outcome, lives = keeper.outcome(job)
                 if not lives:
                     dismiss([keeper])
                 del busy[line]

@@ -130,8 +130,8 @@ def test_a_keeper_shares_a_process_among_cells_that_want_the_same(tmp_path: Path
         keeper = Keeper()
     for cell, (isolation, threads) in zip(ready.plan.cells, wanted, strict=True):
         job = Job(ready.folder, cell, ready.plan.plugin_files, threads, Settings(isolation=isolation))
-        keeper.take(job)
-        outcome, lives = keeper.done(job)
+        keeper.begin(job)
+        outcome, lives = keeper.outcome(job)
         assert (outcome.status, lives) == ("ok", True), outcome.reason
         pids.append(next(iter(ready.store.disparity(cell).values()))[0, 0])
     dismiss([keeper])
