@@ -1,1 +1,4 @@
-"""Timings that can be judged: measured in fresh processes by tests/benchmarks, compared with what is stored."""
+"""`matbench bench`: timings that can be judged.
+
+The subjects of tests/benchmarks are timed in fresh processes and compared with stored ratios or another commit.
+"""

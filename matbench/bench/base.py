@@ -1,4 +1,4 @@
-"""The working tree against another commit, measured in turns on the same machine."""
+"""The working tree against another commit, the base: both measured in turns on the same machine."""
 
 import os
 import shutil
@@ -23,18 +23,21 @@ from matbench.measures.statistics import CONFIDENCE
 from matbench.plans.plugins import kernel_cache
 
 PAIRS = 4
-"""Pairs of processes: each gives one ratio of every subject, and where their memory lies differs."""
+"""Pairs of processes; each gives one ratio of every subject.
+
+Where a process's memory lies changes its speed by some per cent, for as long as it lives: so several are needed.
+"""
 
 
 @frozen
 class Versus:
-    """A subject in both trees.
+    """How fast a subject is in the working tree, compared with the base.
 
     Parameters
     ----------
     ratio, low, high
         Time of the working tree / time of the base: geometric mean over the pairs of processes, and its
-        interval by Student's t on the logarithms; NaN where one of them has no such subject.
+        confidence interval by Student's t on the logarithms; NaN where one of them lacks the subject.
     reason
         Why there is no ratio.
     """
@@ -46,7 +49,7 @@ class Versus:
     reason: str = ""
 
     def verdict(self, margin: float) -> Literal["slower", "faster", "same", "unsure", "not compared"]:
-        """``slower`` or ``faster`` only if the whole interval says so and the ratio is beyond the margin."""
+        """``slower`` or ``faster`` if the whole interval lies on that side of 1 and the ratio is beyond the margin."""
         if self.reason:
             return "not compared"
         if self.low > 1 and self.ratio > 1 + margin:
@@ -85,10 +88,10 @@ def commit(code: Path, name: str) -> str:
 
 
 def last_change(code: Path, file: Path) -> str | None:
-    """The commit that last changed a file of a checkout; None if it is not known.
+    """The commit that last changed a file of a checkout; None if that is not known.
 
-    It is not where there is no repository or only its newest part (a shallow clone), where the checkout is
-    but a part of another repository, and where the file is not committed as it is.
+    It is unknown where there is no repository, only its newest part (a shallow clone), or a repository
+    that holds the checkout as one of its folders; and where the file has uncommitted changes.
     """
     try:
         if not file.is_file() or Path(_git(code, "rev-parse", "--show-toplevel")).resolve() != code.resolve():
@@ -103,7 +106,7 @@ def last_change(code: Path, file: Path) -> str | None:
 
 
 def _needs(code: Path) -> tuple[Any, ...]:
-    """What a checkout declares to depend on."""
+    """The dependencies that a checkout declares: of Python, of the package, of its tests."""
     project = tomllib.loads((code / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     return (
         project.get("requires-python"),
@@ -114,12 +117,18 @@ def _needs(code: Path) -> tuple[Any, ...]:
 
 @contextmanager
 def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
-    """Another commit in a git worktree, with an environment of its own; both go when it ends.
+    """Another commit in a git worktree, with a virtual environment; both are removed when the block ends.
 
-    Where it declares the same dependencies as the working tree, its environment shares the libraries
+    Where it declares the same dependencies as the working tree, its environment uses the libraries
     that are installed here: the same versions, and no network is needed. Else they are installed.
-    What is compiled of its kernels stays, for the next time.
+    Its compiled kernels stay for the next time.
+
+    Raises
+    ------
+    UserError
+        If git or pip fails.
     """
+    # the same folder for the same commit every time: numba finds compiled kernels by the path of their source
     kept = kernel_cache().parent / digest
     try:
         with ExitStack() as stack:
@@ -127,7 +136,8 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
             code = stack.enter_context(_folder_alone(kept, place / "code"))
             _git(here.code, "worktree", "prune")
             _git(here.code, "worktree", "add", "--detach", "--quiet", str(code), digest)
-            # numba takes a kernel as compiled if its file's path, time and size are the same
+            # numba reuses a compiled kernel only if its source has the same path, time and size;
+            # a new checkout has new times, so all get the same one
             for file in code.rglob("*.py"):
                 os.utime(file, (0, 0))
             environment = place / "venv"
@@ -149,9 +159,9 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
 
 @contextmanager
 def _folder_alone(kept: Path, else_this: Path) -> Iterator[Path]:
-    """A folder that does not exist yet and goes when it ends; the other one while another process has the first.
+    """A new folder ``kept/code``, removed when the block ends; `else_this` if another process is using that.
 
-    What a process that was killed has left there goes, too: the system gives its lock back.
+    What a killed process has left in the folder is removed first: the system has released its lock.
     """
     kept.mkdir(parents=True, exist_ok=True)
     lock = FileLock(kept / ".lock")
@@ -174,7 +184,10 @@ def _python(environment: Path) -> Path:
 
 
 def _share_libraries(python: Path, code: Path, here: Tree) -> None:
-    """Its own code first, then every folder of libraries of this process, the working tree's code never."""
+    """Let the base's interpreter find its own code first, then all libraries of this process.
+
+    The working tree's own code is left out: else the base would be measured with it.
+    """
     packages = _run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))")
     standard = {str(Path(os.__file__).parent), str(Path(os.__file__).parent / "lib-dynload")}
     shared = [
@@ -202,9 +215,9 @@ def compare(
     rounds: int = ROUNDS,
     progress: Progress = print,
 ) -> list[Versus]:
-    """Both trees in turns, by the working tree's benchmarks, in several pairs of processes.
+    """Measure both trees in turns, by the working tree's benchmarks, in several pairs of processes.
 
-    What is unsure after them is measured in as many again.
+    Subjects that are unsure after `pairs` pairs are measured in as many again.
     """
     taken: dict[str, list[Turns]] = {name: [] for name in names}
     found: dict[str, Versus] = {}
@@ -221,10 +234,11 @@ def compare(
 
 
 def versus(name: str, pairs: Sequence[Turns]) -> Versus:
-    """What pairs of processes say of a subject."""
+    """Sum up what several pairs of processes measured of a subject."""
     for one in pairs:
         if one.reason:
             return Versus(name, reason=one.reason)
+    # ratios multiply, so their logarithms are averaged: half and twice as fast cancel out
     logs = np.log([one.ratio for one in pairs])
     ratio = float(np.exp(logs.mean()))
     if logs.size < 2:

@@ -1,4 +1,4 @@
-"""Stored ratios of a kind of machine, and when a measured one is a regression."""
+"""Baselines: the stored ratios for each kind of machine, and the judgement whether a subject has become slower."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -16,16 +16,17 @@ from matbench.bench.measuring import BENCHMARKS, ROUNDS, Progress, Sitting, Timi
 from matbench.errors import UserError
 
 MARGIN = 0.15
-"""How much more time than the stored code a subject may take, as a share of it."""
+"""How much slower than the stored code a subject may be, as a share of its time."""
 
 SUSPECT = 0.1
-"""How far a ratio must lie above the stored one, as a share of it, for a closer look; less with a margin below it."""
+"""How far above the stored ratio a subject must lie for a closer look, as a share; the margin, if that is smaller."""
 
 SITTINGS = 3
-"""Fresh processes that decide together where the commit that stored a ratio is not at hand: their median does."""
+"""Processes whose median decides, where the commit that stored a ratio is not at hand."""
 
 UPDATES = 5
-"""Fresh processes when ratios are stored: that counts in which the reference was quickest."""
+"""Processes when ratios are stored. For each subject the one counts in which the reference was quickest:
+the process that other work on the machine disturbed least."""
 
 Verdict = Literal["ok", "slower", "faster", "unsure", "new", "failed"]
 
@@ -39,11 +40,11 @@ class Baseline:
     machine
         See `machine.kind`.
     digest
-        Of the reference workload that ratios are in units of, and of the subjects.
+        Digest of the reference workload, in units of which ratios are given, and of the subjects.
     code
-        Digest of the methods' code whose ratios they are, see `code_digest`.
+        Digest of the methods' code that was measured, see `code_digest`.
     ratios
-        Subject -> its ratio, of the process that others disturbed least.
+        Subject -> its ratio, from the process that was disturbed least.
     compilation
         The time of compiling all methods, in units of compiling the reference; None if it was not measured.
     """
@@ -62,13 +63,13 @@ class Judged:
     Parameters
     ----------
     timing
-        Of the first sitting; None if it could not be measured.
+        From the first sitting; None if it could not be measured.
     ratios
-        One of each sitting.
+        One ratio from each sitting.
     stored
-        The ratio that is; NaN if none is.
+        The stored ratio; NaN if there is none.
     against
-        The working tree against the code that the ratio was stored of; None where that was not asked.
+        The working tree compared in turns with the stored code; None where that was not needed.
     reason
         Why it could not be measured.
     """
@@ -83,12 +84,12 @@ class Judged:
 
     @property
     def ratio(self) -> float:
-        """Median over the sittings."""
+        """The median of the sittings' ratios."""
         return median(self.ratios) if self.ratios else float("nan")
 
     @property
     def change(self) -> float:
-        """How much slower than the stored code, as a share: as measured in turns, else by the ratios."""
+        """How much slower than the stored code, as a share: measured in turns if possible, else by the ratios."""
         return self.against.ratio - 1 if self.against else self.ratio / self.stored - 1
 
 
@@ -98,7 +99,7 @@ def folder(tree: Tree) -> Path:
 
 
 def code_digest(code: Path) -> str:
-    """SHA-256 of the methods of a checkout."""
+    """SHA-256 of the code of all methods of a checkout."""
     digest = sha256()
     for file in sorted((code / "algorithms").rglob("*.py")):
         digest.update(f"{file.relative_to(code).as_posix()}\0".encode() + file.read_bytes())
@@ -111,7 +112,7 @@ def read(place: Path) -> list[Baseline]:
     Raises
     ------
     UserError
-        If a file there is none.
+        If a file there is not a baseline.
     """
     return [_read(path) for path in sorted(place.glob("*.json"))]
 
@@ -124,7 +125,7 @@ def _read(path: Path) -> Baseline:
 
 
 def replaced(place: Path, baseline: Baseline) -> Baseline | None:
-    """What is stored of this kind of machine; None if that cannot be read, or is of another reference."""
+    """The stored baseline that a new one will replace; None if there is none that fits the reference workload."""
     try:
         before = _read(place / machine.file_name(baseline.machine))
     except UserError:
@@ -133,22 +134,22 @@ def replaced(place: Path, baseline: Baseline) -> Baseline | None:
 
 
 def store_baseline(place: Path, baseline: Baseline) -> Path:
-    """Store a baseline in place of what is stored of its kind of machine."""
+    """Store a baseline, in place of the one for the same kind of machine; its path."""
     path = place / machine.file_name(baseline.machine)
     place.mkdir(parents=True, exist_ok=True)
-    digits = {name: float(f"{ratio:.4g}") for name, ratio in sorted(baseline.ratios.items())}  # more were not measured
+    digits = {name: float(f"{ratio:.4g}") for name, ratio in sorted(baseline.ratios.items())}  # the rest is noise
     content = {**cattrs.unstructure(baseline), "ratios": digits}
     path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     return path
 
 
 def matching(place: Path, kind: Mapping[str, str], digest: str) -> tuple[Baseline | None, str]:
-    """The baseline of this kind of machine; else None, and in words what the nearest one differs in.
+    """The baseline of this kind of machine; else None and, in words, how the nearest one differs.
 
     Raises
     ------
     UserError
-        If a file there is no baseline.
+        If a file there is not a baseline.
     """
     stored = {path.name: _read(path) for path in sorted(place.glob("*.json"))}
     if not stored:
@@ -163,7 +164,7 @@ def matching(place: Path, kind: Mapping[str, str], digest: str) -> tuple[Baselin
 
 
 Decide = Callable[[Sequence[str]], Sequence[Versus]]
-"""The working tree against the code whose ratios are stored, of some subjects."""
+"""Compares the working tree with the stored code in turns, for some subjects."""
 
 
 def judge(
@@ -176,16 +177,18 @@ def judge(
 ) -> list[Judged]:
     """Compare a sitting with the stored ratios, and look closer at what seems slow.
 
-    What other machines' work does to this one moves ratios for minutes, by up to 40 per cent. So a ratio
-    beyond `SUSPECT` raises a suspicion only. It is decided by measuring both codes in turns; where
-    the other is not at hand, or has no such subject, by `SITTINGS` processes whose median must lie beyond it.
+    Other work on the same host moves ratios for minutes, by up to 40 per cent. So a ratio beyond `SUSPECT`
+    only makes a subject suspect. The suspicion is settled by measuring both codes in turns. Where the stored
+    code is not at hand, or lacks the subject, the median of `SITTINGS` processes must lie beyond the margin.
 
     Parameters
     ----------
+    stored
+        The baseline; None if there is none, and then no subject is judged.
     again
         Measures some subjects in a fresh process.
     decide
-        Measures some subjects in turns with the code whose ratios are stored; nothing if that is not at hand.
+        Measures some subjects in turns with the stored code; gives nothing if that is not at hand.
     """
     old = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
     ratios = {name: [timing.ratio] for name, timing in first.timings.items()}
@@ -217,7 +220,7 @@ def judge(
 
 
 def establish(tree: Tree, names: Sequence[str], rounds: int = ROUNDS, progress: Progress = lambda _: None) -> Baseline:
-    """Of `UPDATES` fresh processes, for each subject that in which the reference took least.
+    """Measure a new baseline in `UPDATES` processes; the one with the quickest reference counts for each subject.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What compiling all methods costs: in a fresh process without any cached kernel, against a budget of its own."""
+"""How long compiling all methods takes, in a fresh process without cached kernels. It has a budget of its own."""
 
 import tempfile
 from collections.abc import Mapping
@@ -9,17 +9,17 @@ from attrs import evolve, frozen
 from matbench.bench.measuring import Tree, run_program
 
 BUDGET = 1.5
-"""How many times as long as stored compiling may take; a median of three is taken where the first is beyond it."""
+"""How many times the stored time compiling may take; if the first measurement is beyond it, the median of three."""
 
 
 @frozen
 class Compilation:
-    """Compiling every method, one after the other.
+    """The time of compiling every method, one after the other.
 
     Parameters
     ----------
     seconds
-        Method -> processor seconds for what no method before it had compiled.
+        Method -> processor seconds for the kernels that no method before it had compiled.
     reference
         Processor seconds of compiling the frozen reference's inner loop, in the same process.
     digest
@@ -32,12 +32,12 @@ class Compilation:
 
     @property
     def ratio(self) -> float:
-        """Compiling everything, in units of compiling the reference."""
+        """Time of compiling everything, in units of compiling the reference."""
         return sum(self.seconds.values()) / self.reference
 
 
 def compile_all(tree: Tree) -> Compilation:
-    """Compile in a fresh process.
+    """Compile all methods in a fresh process, with an empty kernel cache.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Layer one: exact counters of work, compared with those in tests/benchmarks/counters.json."""
+"""Exact counters of work, compared with those in tests/benchmarks/counters.json.
+
+Counters are the first layer of `matbench bench`: they are the same on every machine, so any change is real.
+"""
 
 import json
 from collections.abc import Mapping
@@ -11,13 +14,13 @@ Work = Mapping[str, Mapping[str, int]]
 
 
 def counted(tree: Tree) -> Work:
-    """What the methods count on their scenes, in a fresh process."""
+    """Count the methods' work on their scenes, in a fresh process."""
     found: Work = run_program(tree, "work")
     return found
 
 
 def stored(tree: Tree) -> Work:
-    """What they counted when it was last accepted.
+    """The counters that were last accepted (`matbench bench --update`).
 
     Raises
     ------
@@ -33,12 +36,12 @@ def stored(tree: Tree) -> Work:
 
 
 def store(tree: Tree, work: Work) -> None:
-    """Accept counters."""
+    """Accept these counters: store them."""
     (tree.code / BENCHMARKS / "counters.json").write_text(json.dumps(work, indent=1) + "\n", encoding="utf-8")
 
 
 def changes(before: Work, now: Work) -> list[str]:
-    """What differs, one counter a line, such as ``sgbm: pixel_disparities 49,152 -> 98,304``."""
+    """The counters that differ, one a line, such as ``sgbm: pixel_disparities 49,152 -> 98,304``."""
     names = {(method, name) for work in (before, now) for method, counts in work.items() for name in counts}
     pairs = [
         (f"{method}: {name}", before.get(method, {}).get(name), now.get(method, {}).get(name))

@@ -1,4 +1,4 @@
-"""How time grows with the picture, the disparities and the views, and how far it is from the machine's limits."""
+"""How solving time grows with pixels, disparities and views, compared with the limits of the machine."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -28,25 +28,25 @@ METHODS = {
     "voxel_coloring": "voxel_coloring[fineness=1]",
     "sgbm": "sgbm",
 }
-"""Name -> selector: all views, whole-pixel planes, so that only what is varied varies."""
+"""Name -> selector. All methods use every view and whole-pixel planes, so that only the varied size changes."""
 
 PEER = "sgbm"
-"""Stands in every table: everybody knows it."""
+"""The method that stands in every table for comparison: OpenCV's, which everybody knows."""
 
 AXES: Mapping[str, tuple[tuple[int, int, int, int], ...]] = {
     "pixels": ((64, 48, 16, 3), (96, 72, 16, 3), (128, 96, 16, 3), (192, 144, 16, 3), (256, 192, 16, 3)),
     "disparities": ((128, 96, 8, 3), (128, 96, 16, 3), (128, 96, 32, 3), (128, 96, 64, 3)),
     "views": ((128, 96, 16, 3), (128, 96, 16, 5), (128, 96, 16, 7), (128, 96, 16, 9)),
 }
-"""What is varied -> width, height, disparities and views of each scene."""
+"""What is varied -> (width, height, disparities, views) of each scene."""
 
 COUNTERS = ("point_updates", "pair_similarities", "ssd_evaluations", "voxels_tested", "pixel_disparities")
-"""The work that time is held against: the first of these that a method counts."""
+"""The counter that time is divided by: the first of these that a method has."""
 
 
 @define
 class Point:
-    """A method on one scene: the least processor time of all solves, and what it counted."""
+    """A method on one scene: the least processor time of all its solves, and its counters of work."""
 
     method: str
     setting: tuple[int, int, int, int]
@@ -55,7 +55,7 @@ class Point:
     solves: int = 0
 
     def along(self, axis: str) -> float:
-        """Its place on an axis."""
+        """The value that is varied on an axis."""
         width, height, disparities, views = self.setting
         return float({"pixels": width * height, "disparities": disparities, "views": views}[axis])
 
@@ -67,7 +67,7 @@ class Point:
 
     @property
     def counter(self) -> tuple[str, int]:
-        """The work that it is held against."""
+        """Name and value of the work that its time is divided by."""
         for name in COUNTERS:
             if self.work.get(name):
                 return name, self.work[name]
@@ -76,14 +76,14 @@ class Point:
 
 @frozen
 class Fit:
-    """Time ~ value ** exponent, by least squares on logarithms.
+    """The exponent in time ~ value ** exponent, by least squares on the logarithms.
 
     Parameters
     ----------
     exponent, low, high
-        With its interval by Student's t; NaN with fewer than three points.
+        The exponent and its confidence interval by Student's t.
     ideal
-        The exponent of the work that the method counts over the same scenes.
+        The exponent of the counted work over the same scenes: that of a method whose time is its work.
     """
 
     method: str
@@ -96,7 +96,7 @@ class Fit:
 
 @frozen
 class Growth:
-    """All that a sitting measured; `left_out` says which points were not for want of time."""
+    """Everything that was measured; `left_out` says which points were not, for want of time."""
 
     points: tuple[Point, ...]
     fits: tuple[Fit, ...]
@@ -118,7 +118,7 @@ class Growth:
 
 
 def chosen(patterns: Sequence[str]) -> list[str]:
-    """The methods that names or patterns mean, the peer always among them."""
+    """The methods that names or patterns mean; the peer is always added."""
     for pattern in patterns:
         if not any(pattern == name or fnmatchcase(name, pattern) for name in METHODS):
             raise unknown("method", pattern, METHODS)
@@ -134,17 +134,25 @@ def _instance(name: str) -> Algorithm:
 
 
 def _scene(setting: tuple[int, int, int, int]) -> Scene:
-    """The built-in box with so many whole disparities per view step, whatever its pair is."""
+    """The built-in box, in which a method with whole-pixel planes searches so many of them.
+
+    The range is given in pixels of the pair, which lies more than one view step apart where there are many views.
+    """
     width, height, disparities, views = setting
     pair_steps = max(1, views - 1 - views // 2)
     return load_scene(f"synthetic/box[size={width}x{height} n={views} disparities=0:{(disparities - 1) * pair_steps}]")
 
 
 def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], None]) -> Growth:
-    """Time every method on every scene, on one thread, round after round until the time is used up.
+    """Time every method on every scene, on one thread, in rounds until the time is used up.
 
-    In the first round scenes come from the smallest to the largest; one for which no time is left is
-    left out. Of all rounds the least time counts, as disturbances only add to it.
+    In the first round scenes come from the smallest to the largest; those for which no time is left are
+    left out. The least time of all rounds counts, as disturbances can only add to it.
+
+    Parameters
+    ----------
+    seconds
+        How long to measure, compilation apart.
     """
     import cv2
 
@@ -170,6 +178,7 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
                 if setting not in scenes:
                     scenes[setting] = _scene(setting)
                 _solve(point, instances[name], scenes[setting])
+        # measured again in every round: the machine's limits must come from the same minutes as the times
         roofline = roofline.best(measure_roofline(2))
         took = time.monotonic() - begin
     left_out = [_left_out(setting, [points[name, setting] for name in methods]) for setting in settings]
@@ -179,7 +188,7 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
 
 
 def _left_out(setting: tuple[int, int, int, int], points: Sequence[Point]) -> str:
-    """Which methods had no time left on a scene; empty if none."""
+    """Which methods were not measured on a scene, in words; empty if all were."""
     missing = [point.method for point in points if not point.solves]
     return f"{_words(setting)}: {', '.join(missing)}" if missing else ""
 
@@ -190,7 +199,7 @@ def _words(setting: tuple[int, int, int, int]) -> str:
 
 
 def _solve(point: Point, method: Algorithm, scene: Scene) -> None:
-    """One solve, or as many as take a hundredth of a second."""
+    """Solve once; where that is short, for a hundredth of a second, as the least of several times is the steadier."""
     spent = 0.0
     while spent < 0.01:
         begin = time.thread_time()
@@ -214,7 +223,7 @@ def _fits(growth: Growth, methods: Sequence[str]) -> Iterator[Fit]:
 
 
 def exponent(at: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Slope of log values over log at, and its interval."""
+    """The slope of log `values` over log `at`, and its confidence interval (slope, low, high)."""
     from scipy.stats import linregress, t
 
     line: Any = linregress(np.log(at), np.log(values))

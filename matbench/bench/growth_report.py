@@ -1,4 +1,4 @@
-"""Growth as tables and as a figure: log-log, with the ideal beside what was measured."""
+"""How time grows, as tables and as a log-log figure with the counted work beside the measured time."""
 
 import csv
 from pathlib import Path
@@ -22,7 +22,7 @@ _WORDS = {"pixels": "pixels of a view", "disparities": "disparities", "views": "
 
 
 def exponents(growth: Growth) -> Table:
-    """Fitted exponents; in brackets those of the counted work, which is the ideal."""
+    """The table of fitted exponents; in brackets those of the counted work, which are the ideal."""
     rows = []
     for method in growth.methods:
         cells = [method]
@@ -37,7 +37,7 @@ def exponents(growth: Growth) -> Table:
 
 
 def costs(growth: Growth) -> Table:
-    """Nanoseconds per unit on the largest picture, beside what the machine could do meanwhile."""
+    """The table of nanoseconds per unit of work on the largest images, and what the machine could do in that time."""
     rows = []
     sizes = AXES["pixels"]
     largest = next((s for s in reversed(sizes) if all(growth.at(m, s) for m in growth.methods)), sizes[0])
@@ -64,7 +64,7 @@ def costs(growth: Growth) -> Table:
 
 
 def machine(growth: Growth) -> str:
-    """The limits measured in the same sitting, in words."""
+    """The limits of the machine, measured together with the times, in words."""
     roofline = growth.roofline
     return (
         f"in the same sitting, one thread: memory {roofline.bandwidth:.1f} GB/s (STREAM triad), arithmetic "
@@ -73,7 +73,7 @@ def machine(growth: Growth) -> str:
 
 
 def write_growth(growth: Growth, folder: Path) -> list[Path]:
-    """``growth.csv``, ``growth.png`` and ``growth.pdf``."""
+    """Write ``growth.csv``, ``growth.png`` and ``growth.pdf`` into a folder; their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     table = folder / "growth.csv"
     with table.open("w", newline="", encoding="utf-8") as file:

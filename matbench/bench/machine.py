@@ -1,4 +1,4 @@
-"""What kind of machine this is, as far as it decides how long compiled code takes."""
+"""The kind of machine this is: whatever decides how long compiled code takes."""
 
 import os
 import platform
@@ -26,6 +26,7 @@ def _processor() -> str:
 
 
 def _minor(library: str) -> str:
+    """Version of a library without its last part: patch releases rarely change speed, and would void baselines."""
     try:
         return ".".join(version(library).split(".")[:2])
     except PackageNotFoundError:
@@ -33,7 +34,7 @@ def _minor(library: str) -> str:
 
 
 def kind() -> dict[str, str]:
-    """What must agree for stored ratios to mean something: processor, system, and what compiles and computes."""
+    """What must be equal for stored ratios to apply: processor, system, compilers and numerical libraries."""
     return {
         "processor": _processor(),
         "architecture": platform.machine(),
@@ -52,7 +53,7 @@ def file_name(machine: Mapping[str, str]) -> str:
 
 
 def differences(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
-    """Where two kinds differ, such as ``numba 0.67 -> 0.68``."""
+    """How two kinds of machine differ, such as ``numba 0.67 -> 0.68``."""
     return [
         f"{key} {one.get(key, 'none')} -> {other.get(key, 'none')}"
         for key in dict.fromkeys((*one, *other))

@@ -1,4 +1,4 @@
-"""One sitting: the subjects of tests/benchmarks timed by pytest-benchmark in a fresh process."""
+"""A sitting: the subjects of tests/benchmarks, timed by pytest-benchmark in one fresh process."""
 
 import importlib.util
 import json
@@ -21,22 +21,25 @@ from matbench.plans.plugins import kernel_cache
 
 BENCHMARKS = Path("tests", "benchmarks")
 ROUNDS, PARTS = 25, 3
-_LARGEST = str(2**30)  # bytes that malloc keeps rather than giving back: pages come new once, not in every round
+# bytes: malloc keeps freed blocks up to this size instead of giving them back to the system. Else every round
+# would get fresh pages, and the time would be mostly that of the system clearing them.
+_LARGEST = str(2**30)
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @frozen
 class Timing:
-    """A subject in one sitting.
+    """What a sitting measured of one subject.
 
     Parameters
     ----------
     ratio, low, high
-        Median over the rounds of subject / reference, one call each, and its 95 % interval within the sitting.
+        Time of a call of the subject / time of a call of the reference workload, both in the same round: the
+        median over the rounds, and its 95 % interval within this sitting.
     seconds
-        Processor time of one call, the median.
+        Median processor time of one call.
     reference
-        That of one call of the reference, meanwhile.
+        The same of one call of the reference.
     group
         ``method`` or ``kernel``.
     """
@@ -52,14 +55,14 @@ class Timing:
 
 @frozen
 class Sitting:
-    """What a process measured.
+    """What one process measured.
 
     Parameters
     ----------
     failed
         Subject -> why it could not be measured.
     digest
-        Of the reference workload and of what was timed.
+        Digest of the reference workload and of the subjects.
     """
 
     timings: Mapping[str, Timing]
@@ -69,7 +72,7 @@ class Sitting:
 
 @frozen
 class Tree:
-    """Code that is measured.
+    """A checkout of matbench that is measured.
 
     Parameters
     ----------
@@ -78,7 +81,7 @@ class Tree:
     python
         The interpreter whose libraries it runs with.
     kernels
-        Where its compiled kernels are kept: a folder for each state of the code.
+        The folder of its compiled kernels: one for each state of the code.
     """
 
     code: Path
@@ -87,12 +90,12 @@ class Tree:
 
     @classmethod
     def here(cls) -> "Tree":
-        """The working tree that this very code lies in.
+        """The checkout that this module lies in.
 
         Raises
         ------
         UserError
-            If matbench is not run from a checkout, or without what times it.
+            If matbench is not run from a checkout, or pytest-benchmark is not installed.
         """
         code = Path(__file__).resolve().parents[2]
         if not (code / BENCHMARKS / "test_speed.py").is_file():
@@ -106,9 +109,10 @@ class Tree:
 
 
 def environment(tree: Tree) -> dict[str, str]:
-    """Variables of a process that measures: one thread, its own kernels, memory that is kept.
+    """The environment of a process that measures: one thread, the tree's own kernels, memory kept by malloc.
 
-    What is said there to pytest is not meant for it; within a test that runs beside others it would time nothing.
+    Variables for pytest are left out. They are meant for an outer pytest; under pytest-xdist they would
+    make pytest-benchmark time nothing.
     """
     kept = {"MALLOC_MMAP_THRESHOLD_": _LARGEST, "MALLOC_TRIM_THRESHOLD_": _LARGEST, "PYTHONHASHSEED": "0"}
     threads = dict.fromkeys(_ONE_THREAD, "1")
@@ -130,12 +134,12 @@ def _pytest(tree: Tree, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def subjects(tree: Tree, patterns: Sequence[str] = ()) -> list[str]:
-    """The subjects of a checkout that are meant by names or patterns; all without any.
+    """The subjects of a checkout that names or patterns mean; all of them if none are given.
 
     Raises
     ------
     UserError
-        If a pattern means none of them.
+        If a pattern means no subject.
     """
     listed = runpy.run_path(str(tree.code / BENCHMARKS / "subjects.py"))
     names = [*listed["METHODS"], *listed["KERNELS"]]
@@ -149,12 +153,12 @@ def subjects(tree: Tree, patterns: Sequence[str] = ()) -> list[str]:
 
 
 def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS) -> Sitting:
-    """Time subjects in a fresh process.
+    """Time subjects in a fresh process, in rounds with the reference workload.
 
     Raises
     ------
     UserError
-        If the process could not measure at all, or measured other code than the tree's.
+        If the process measured nothing, or measured other code than the tree's.
     """
     with tempfile.TemporaryDirectory(prefix="matbench-bench-") as place:
         written = Path(place, "benchmarks.json")
@@ -182,7 +186,7 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS) -> Sitting:
 
 
 def _timing(parts: Sequence[Any]) -> Timing:
-    """All rounds of a subject together."""
+    """The timing of a subject from all its rounds."""
     ratios = np.concatenate([part["extra_info"]["ratios"] for part in parts])
     seconds, reference = (
         float(np.median([part["extra_info"][of] for part in parts])) for of in ("seconds", "reference_seconds")
@@ -191,7 +195,7 @@ def _timing(parts: Sequence[Any]) -> Timing:
 
 
 def run_program(tree: Tree, name: str) -> Any:
-    """What a program of tests/benchmarks prints as JSON, in a fresh process.
+    """Run a program of tests/benchmarks in a fresh process; what it prints, as JSON.
 
     Raises
     ------
@@ -219,4 +223,4 @@ def _last_line(done: subprocess.CompletedProcess[str]) -> str:
 
 
 Progress = Callable[[str], None]
-"""Told what begins, in words."""
+"""Called with what begins, in words."""

@@ -1,4 +1,4 @@
-"""What the machine itself can do on one thread: memory bandwidth and arithmetic, as everybody measures them."""
+"""The limits of the machine on one thread: memory bandwidth and arithmetic, by the usual benchmarks."""
 
 import time
 
@@ -6,14 +6,14 @@ import numpy as np
 from attrs import frozen
 from numba import njit
 
-_TRIAD = 1 << 23  # numbers: three arrays of 32 MiB, beyond most caches
+_TRIAD = 1 << 23  # numbers: three arrays of 32 MiB, beyond most caches, so that memory is measured
 _TERMS, _ROWS = 32, 2000
 _compiled = njit(nogil=True, fastmath={"contract", "reassoc", "nsz"})
 
 
 @frozen
 class Roofline:
-    """Best of several measurements, one thread.
+    """The best of several measurements on one thread.
 
     Parameters
     ----------
@@ -29,6 +29,7 @@ class Roofline:
     arithmetic: float
 
     def best(self, other: "Roofline") -> "Roofline":
+        """The higher limits of both: disturbances only lower what is measured."""
         return Roofline(max(self.bandwidth, other.bandwidth), max(self.arithmetic, other.arithmetic))
 
 
@@ -50,7 +51,7 @@ def _horner(x, factors, times):  # type: ignore[no-untyped-def]
 
 
 def measure(repeats: int = 5) -> Roofline:
-    """Measure both now."""
+    """Measure both limits; the best of `repeats` tries."""
     a, b, c = np.ones((3, _TRIAD), np.float32)
     x, factors = np.full(1024, 0.5, np.float32), np.full(_TERMS + 1, 0.25, np.float32)
     _triad(a, b, c, np.float32(0.5))

@@ -1,4 +1,4 @@
-"""What was measured, as rows of words: for the terminal and for a job summary in Markdown."""
+"""The tables of `matbench bench`, for the terminal and, in Markdown, for a job summary."""
 
 from collections.abc import Mapping, Sequence
 from math import isnan
@@ -16,7 +16,7 @@ from matbench.bench.measuring import Timing
 
 @frozen
 class Table:
-    """Rows of words under heads; the first `words` columns are words, the others numbers. Notes come below."""
+    """A table of texts. The first `words` columns are aligned left, the others, numbers, right. Notes come below."""
 
     title: str
     heads: tuple[str, ...]
@@ -25,7 +25,7 @@ class Table:
     notes: tuple[str, ...] = ()
 
     def rich(self) -> RichTable:
-        """For the terminal."""
+        """The table for the terminal."""
         table = RichTable(title=Text(self.title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
         table.padding, table.pad_edge, table.show_edge = (0, 1, 0, 0), False, False
         for number, head in enumerate(self.heads):
@@ -35,7 +35,7 @@ class Table:
         return table
 
     def markdown(self) -> str:
-        """For a job summary."""
+        """The table for a job summary."""
         sides = ["---"] * self.words + ["--:"] * (len(self.heads) - self.words)
         lines = [self.heads, sides, *self.rows]
         escaped = ("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
@@ -43,7 +43,7 @@ class Table:
 
 
 def seconds(value: float) -> str:
-    """``12.3 ms``."""
+    """A time with its unit, such as ``12.3 ms``."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
         if value >= size:
             return f"{value / size:.3g} {unit}"
@@ -55,12 +55,12 @@ def _number(value: float, places: str = ".3f") -> str:
 
 
 def _reach(timing: Timing | None) -> str:
-    """Half of the interval, as a share of the ratio."""
+    """Half the width of the interval, as a share of the ratio."""
     return "" if timing is None else f"{(timing.high - timing.low) / (2 * timing.ratio):.1%}"
 
 
 def judged(results: Sequence[Judged]) -> Table:
-    """Layer two."""
+    """The times, judged by the stored ratios."""
     rows = tuple(
         (
             one.name,
@@ -79,7 +79,7 @@ def judged(results: Sequence[Judged]) -> Table:
 
 
 def compared(results: Sequence[Versus], margin: float, base: str) -> Table:
-    """The working tree against a base."""
+    """The times of the working tree compared with those of a base."""
     rows = tuple(
         (
             one.name,
@@ -95,7 +95,7 @@ def compared(results: Sequence[Versus], margin: float, base: str) -> Table:
 
 
 def compiled(found: Compilation, stored: float | None, ratio: float) -> Table:
-    """Compilation; the line of all of them has what is stored."""
+    """The times of compilation; the last line has the sum and the stored one."""
     parts = [(name, seconds(took), _number(took / found.reference, ".1f"), "") for name, took in found.seconds.items()]
     total = ("all", seconds(sum(found.seconds.values())), f"{ratio:.1f}", "" if stored is None else f"{stored:.1f}")
     heads = "first solve, beyond those above", "CPU time", "references", "stored"
@@ -103,7 +103,7 @@ def compiled(found: Compilation, stored: float | None, ratio: float) -> Table:
 
 
 def counters(work: Mapping[str, Mapping[str, int]]) -> Table:
-    """Layer one."""
+    """The counters of work."""
     rows = tuple(
         (name, ", ".join(f"{key} {count:,}" for key, count in counts.items())) for name, counts in work.items()
     )

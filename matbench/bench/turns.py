@@ -1,7 +1,7 @@
-"""Two trees measured in turns, some milliseconds each, in two processes on one core.
+"""Two trees measured in turns of some milliseconds, in two processes on one core.
 
-What else the machine does slows both alike, whatever it is: so their ratio tells what a ratio to a reference
-workload cannot, a small change on a machine that is never at rest.
+Other work on the machine slows both equally, as their turns follow each other closely. So their ratio shows
+small changes even on a busy machine, which the ratio to a reference workload cannot.
 """
 
 import json
@@ -20,20 +20,20 @@ from attrs import frozen
 from matbench.bench.measuring import BENCHMARKS, Tree, environment
 from matbench.errors import UserError
 
-SLICE = 0.004  # seconds of a turn at least
-ENOUGH, FEWEST = 0.4, 7  # seconds after which a long subject has had turns enough, but never fewer turns
+SLICE = 0.004  # seconds that a turn takes at least: long for the clock, short enough that a disturbance hits both trees
+ENOUGH, FEWEST = 0.4, 7  # a subject that takes long gets turns for 0.4 s in all, but never fewer than 7
 
 
 @frozen
 class Turns:
-    """A subject in a pair of processes.
+    """What one pair of processes measured of a subject.
 
     Parameters
     ----------
     ratio
-        Median over the turns of the time of the one tree / that of the other; NaN without.
+        Median over the turns of time of the working tree / time of the base; NaN if not measured.
     reason
-        Why there is none.
+        Why there is no ratio.
     """
 
     ratio: float = float("nan")
@@ -43,16 +43,16 @@ class Turns:
 def in_turns(
     here: Tree, base: Tree, names: Sequence[str], rounds: int, number: int = 0, tests: Path | None = None
 ) -> Mapping[str, Turns]:
-    """Subjects in a fresh pair of processes, subject after subject.
+    """Measure subjects in a fresh pair of processes, one subject after the other.
 
     Parameters
     ----------
     rounds
-        Turns of each; fewer of what takes long.
+        Turns of each subject; fewer for those that take long.
     number
-        Of the pair: pairs take the cores, and who begins, in turns.
+        Number of the pair. It decides on which core the pair runs and which tree begins.
     tests
-        The checkout whose tests/benchmarks do it; `here` by default.
+        The checkout whose tests/benchmarks are used; `here` by default.
 
     Raises
     ------
@@ -75,11 +75,13 @@ def in_turns(
 
 def _turns(here: "_Side", base: "_Side", name: str, rounds: int, number: int) -> Turns:
     try:
+        # zero calls: the first one compiles and warms up, and tells how long a call takes
         call = max(here.seconds(name, 0), base.seconds(name, 0), 1e-6)
         calls = max(1, round(SLICE / call))
         enough = max(FEWEST, round(ENOUGH / (calls * call)))
         ratios = []
         for turn in range(min(rounds, enough)):
+            # who begins alternates: the first of a turn finds the caches as the other left them
             first, second = (here, base) if (turn + number) % 2 == 0 else (base, here)
             taken = {side: side.seconds(name, calls) for side in (first, second)}
             ratios.append(taken[here] / taken[base])
@@ -89,11 +91,11 @@ def _turns(here: "_Side", base: "_Side", name: str, rounds: int, number: int) ->
 
 
 class _NotMeasured(Exception):
-    """Says where, and why."""
+    """A subject could not be measured in one of the trees; the message says which, and why."""
 
 
 class _Side:
-    """A process that does the subjects of a tree's code when it is told to."""
+    """A process that runs subjects of one tree, as many calls as it is asked for."""
 
     def __init__(self, name: str, tree: Tree, tests: Path, core: int, said: IO[str]):
         self._name, self._tree, self._said = name, tree, said
@@ -117,7 +119,7 @@ class _Side:
         self._process.communicate()
 
     def begin(self) -> None:
-        """Wait until it is there."""
+        """Wait until the process is ready, and check that it has the right code."""
         try:
             code = self._answer()["code"]
         except _NotMeasured as error:
@@ -126,7 +128,7 @@ class _Side:
             raise UserError(f"{code} was measured instead of {self._tree.code}: is another matbench before it?")
 
     def seconds(self, name: str, calls: int) -> float:
-        """Of so many calls; of one for 0, which makes the subject ready."""
+        """Processor seconds of so many calls. With 0 calls: make the subject ready, and the seconds of one call."""
         try:
             print(json.dumps([name, calls]), file=self._process.stdin, flush=True)
         except OSError:

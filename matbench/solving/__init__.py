@@ -1,1 +1,1 @@
-"""How cells are solved: processes, keepers, workers, a cluster; imports all but `results` and what lies above it."""
+"""How cells are solved: in processes of their own, here or on a cluster. Imports no `results` nor what is above it."""

@@ -12,14 +12,17 @@ from matbench.scenes.catalogue import load_scene
 from matbench.solving.worker import hide_truth
 
 EASY, EITHER_SIGN = "synthetic/box[n=5 ref=1]", "synthetic/curved[n=5 ref=1]"
-"""Textured scenes of 240x180 px. The reference view is not in the middle: the field's pair has only one
-side there, and so has any choice of views, so that no method has to toss a coin that its mirror image
-would toss the other way."""
+"""Textured scenes of 240x180 px.
+
+The reference view is not the middle one on purpose. With the middle view, the field's pair could lie on
+either side. A method must then break a tie, and in the mirrored scene it would break it the other way,
+which is no fault.
+"""
 
 
 @frozen(eq=False)
 class Trial:
-    """One solve: a scene (by its parts, as a process is handed them), seed and threads."""
+    """One solve: a scene and the number of threads. The scene is kept as its parts, which can be pickled."""
 
     name: str
     views: NDArray[np.uint8]
@@ -30,16 +33,18 @@ class Trial:
 
     @classmethod
     def of(cls, name: str, scene: Scene, threads: int = 1) -> "Trial":
+        """A trial of a scene; its truth is left out, a method must not see it."""
         return cls(name, scene.views, scene.ref, scene.disparities, scene.pair_steps, threads)
 
     @property
     def scene(self) -> Scene:
+        """The scene, without truth."""
         labels = tuple(str(view) for view in range(len(self.views)))
         return Scene(self.name, self.views, labels, self.ref, self.disparities, {}, self.pair_steps)
 
 
 def mirrored(scene: Scene) -> Scene:
-    """The scene as it is seen in a mirror: columns and the order of the views reversed.
+    """The mirrored scene: columns and the order of the views are reversed.
 
     With x' = W - 1 - x and j' = n - 1 - j, x_j = x_ref - (j - ref) d becomes
     x'_j' = x'_ref' - (j' - ref') d: disparities keep their sign, maps are reversed along their rows.
@@ -59,7 +64,7 @@ def mirrored(scene: Scene) -> Scene:
 
 
 def _small(shape: tuple[int, int], disparities: Range, value: int | None = None) -> Scene:
-    """Three views without any truth: random colours, or one grey everywhere."""
+    """Three views without truth: random colours, or one grey value everywhere."""
     size = (3, *shape, 3)
     pixels = np.random.default_rng(1).integers(0, 256, size) if value is None else np.full(size, value)
     return Scene("small", pixels.astype(np.uint8), ("0", "1", "2"), 1, disparities, {}, 1)
@@ -67,7 +72,7 @@ def _small(shape: tuple[int, int], disparities: Range, value: int | None = None)
 
 @cache
 def trials() -> Mapping[str, Trial]:
-    """Every scene that is tried, by name."""
+    """All trials, by name."""
     easy, either = (hide_truth(load_scene(name)) for name in (EASY, EITHER_SIGN))
     scenes = {
         "easy": easy,

@@ -1,4 +1,9 @@
-"""One solve of `matbench check`: in a process of its own, which a second one watches and clears away."""
+"""One solve of `matbench check`, in a process of its own.
+
+Three processes take part. The check starts a watcher from the fork server. The watcher forks the process
+that runs the method, waits for its answer and then kills everything below itself. So a method may hang,
+crash or leave processes behind, and the check goes on.
+"""
 
 import os
 import tempfile
@@ -31,18 +36,18 @@ _TICK = 0.05  # seconds between two looks at a process
 
 @frozen(eq=False)
 class Answer:
-    """What became of one solve; without maps there is either a `reason` or an `error`.
+    """The result of one solve: maps, or the `reason` why the method declined, or an `error`.
 
     Parameters
     ----------
     maps
-        View -> (H, W) float32 as the harness keeps them.
+        View -> (H, W) float32, as the harness stores them; empty without an answer.
     digest
-        SHA-256 of the estimate: maps, volume, work.
+        SHA-256 of the estimate: maps, volume, history and work.
     infinite
-        How many pixels of the maps were infinite.
+        How many pixels of the maps were infinite; in `maps` these are NaN.
     touched
-        Was the scene changed?
+        Did the method write into the views?
     reason
         Why the method does not support the scene.
     error
@@ -62,7 +67,7 @@ class Answer:
 
 @contextmanager
 def _printing_to(path: Path) -> Iterator[None]:
-    """Send all that this process prints, from Python or from C, to a file."""
+    """Send everything that this process prints, from Python or from C, to a file."""
     with path.open("w", encoding="utf-8", errors="replace", buffering=1) as log:
         kept = os.dup(1), os.dup(2)
         os.dup2(log.fileno(), 1)
@@ -77,7 +82,7 @@ def _printing_to(path: Path) -> Iterator[None]:
 
 
 def solve_here(method: Method, files: Sequence[Path], trial: Trial, log: Path) -> Answer:
-    """Solve one trial in this process; what the method raises is told in the answer."""
+    """Solve one trial in this process; an exception of the method becomes the answer's `error`."""
     with _printing_to(log):
         try:
             plugin = plugins.algorithm(method.algorithm, files)
@@ -106,15 +111,15 @@ def solve_here(method: Method, files: Sequence[Path], trial: Trial, log: Path) -
 
 
 def _where(error: BaseException) -> str:
-    """The line of the method, or of what it calls, that raised; nothing where the harness did."""
+    """The last line outside the harness in the traceback, as `` (file.py:12)``; empty if there is none."""
     frames = [(Path(one.filename), one.lineno) for one in traceback.extract_tb(error.__traceback__)]
     outside = [f" ({path.name}:{line})" for path, line in frames if path.parent.parent != HARNESS]
     return outside[-1] if outside else ""
 
 
 def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Path], trial: Trial, log: Path) -> None:
-    """Have a process below this one solve a trial, send its answer, and end it with all that it has started."""
-    processes.lead_own_session()  # Ctrl-C is for whoever holds the line
+    """The watcher's process: fork a process that solves the trial, send its answer, kill all that is left."""
+    processes.lead_own_session()  # Ctrl-C is for the check, which then closes the line
     answers, theirs = Pipe(duplex=False)
     watcher, pid = os.getpid(), os.fork()
     if not pid:
@@ -124,23 +129,24 @@ def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Pat
                 ours.close()
             processes.confine(limits.room())
             own, found = os.getpid(), solve_here(method, files, trial, log)
-            if os.getpid() == own:  # no copy that the method has made of its process
+            if os.getpid() == own:  # else this is a copy that the method has forked, and not the one to answer
                 theirs.send(found)
                 os._exit(0)
         finally:
             os._exit(1)
     theirs.close()
     try:
-        with suppress(OSError):  # nobody wants it any more
+        with suppress(OSError):  # the check has gone
             line.send(_heard(answers, line, pid, timeout))
     finally:
         processes.kill_descendants()
 
 
 def _heard(answers: Connection, line: Connection, pid: int, timeout: float) -> Answer:
-    """What a process that solves a trial has answered, or what became of it."""
+    """The answer of process `pid`; else an answer that says how it ended, or that the time was up."""
     end, sources = time.monotonic() + timeout, [answers, line]
     while time.monotonic() < end:
+        # first whether it has ended, then what it sent: so an answer sent just before the end is not missed
         ended = processes.reap().get(pid)
         ready = wait(sources, _TICK if ended is None else 0)
         if line in ready:
@@ -159,7 +165,15 @@ def _heard(answers: Connection, line: Connection, pid: int, timeout: float) -> A
 
 
 def solve_apart(method: Method, files: Sequence[Path], trial: Trial, timeout: float) -> Answer:
-    """Solve one trial in a process of its own, which may hang, end as it likes, or leave others behind."""
+    """Solve one trial in a process of its own, which may hang, crash, or leave others behind.
+
+    Parameters
+    ----------
+    files
+        The users' own files with methods.
+    timeout
+        Seconds that the solve may take.
+    """
     with tempfile.TemporaryDirectory(prefix="matbench-check-") as folder:
         log = Path(folder) / "log.txt"
         line, theirs = Pipe()

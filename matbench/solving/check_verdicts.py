@@ -1,4 +1,4 @@
-"""What a method's answers to the small scenes show: one finding for each promise of a method (`matbench check`)."""
+"""The verdicts of `matbench check`: one for each promise of a method, from its answers to the small scenes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -17,17 +17,17 @@ AGREEMENT = 0.99  # share of pixels that must agree: rounding decides ties at si
 
 @frozen
 class CheckResult:
-    """What one check found.
+    """The result of one check.
 
     Parameters
     ----------
     check
-        Its name.
+        The check's name.
     demand
         What it asks of a method.
     verdict
-        ``skipped`` where the method says that it does not support the scene, or nothing could be
-        compared; a ``note`` is no fault.
+        ``skipped``: the method does not support the scene, or there was nothing to compare.
+        ``note``: worth knowing, but no fault.
     reason
         What was found; in a failure, what is wrong.
     """
@@ -39,7 +39,13 @@ class CheckResult:
 
 
 def judge(answers: Mapping[str, Answer]) -> list[CheckResult]:
-    """What the answers to all trials say of a method."""
+    """Judge a method by its answers to all trials.
+
+    Parameters
+    ----------
+    answers
+        Name of the trial -> answer, for every trial of `check_scenes.trials`.
+    """
     return [
         _solved("answers", "whole maps of numbers, not all of them NaN", answers, ["easy"], needs_some=True),
         _solved("views", "two, three and five views", answers, ["two views", "three views", "easy"]),
@@ -59,6 +65,7 @@ def judge(answers: Mapping[str, Answer]) -> list[CheckResult]:
 def _solved(
     name: str, demand: str, answers: Mapping[str, Answer], which: Sequence[str], needs_some: bool = False
 ) -> CheckResult:
+    """Did it answer some trials at all; with `needs_some`, not with NaN everywhere?"""
     wrong = {one: answers[one].error for one in which if answers[one].error}
     wrong |= {one: "NaN everywhere" for one in which if needs_some and _is_empty(answers[one])}
     declined = {one: answers[one].reason for one in which if answers[one].reason}
@@ -67,7 +74,7 @@ def _solved(
 
 
 def _listed(reasons: Mapping[str, str]) -> str:
-    """Trial -> reason, as a line in which each reason stands once."""
+    """Trial -> reason, in one line; trials with the same reason stand together."""
     found: dict[str, list[str]] = {}
     for trial, reason in reasons.items():
         found.setdefault(reason, []).append(trial)
@@ -75,6 +82,7 @@ def _listed(reasons: Mapping[str, str]) -> str:
 
 
 def _is_empty(found: Answer) -> bool:
+    """Are there maps, and all of them NaN everywhere?"""
     return bool(found.maps) and all(np.isnan(values).all() for values in found.maps.values())
 
 
@@ -86,6 +94,7 @@ def _in_range(answers: Mapping[str, Answer]) -> CheckResult:
         bounds = trials()[name].disparities
         answered = [values[~np.isnan(values)] for values in answers[name].maps.values()]
         found = np.concatenate(answered) if answered else np.empty(0, np.float32)
+        # one px of slack: methods interpolate between planes, and may end a little beyond the outermost
         beyond = (found < bounds.least - 1) | (found > bounds.largest + 1)
         if found.size and beyond.mean() > 1 - AGREEMENT:
             wrong[name] = f"{beyond.mean():.1%} beyond {bounds} by more than 1, {found.min():g} to {found.max():g}"
@@ -101,6 +110,7 @@ def _honest(answers: Mapping[str, Answer]) -> CheckResult:
 def _leaves_input(answers: Mapping[str, Answer]) -> CheckResult:
     demand = "the views are left as they were"
     wrong = {name: "changed" for name, found in answers.items() if found.touched}
+    # views are read-only: a method that writes into them usually fails before it changes anything
     wrong |= {name: found.error for name, found in answers.items() if "read-only" in found.error}
     return _seen("input", demand, answers, wrong)
 
@@ -112,7 +122,7 @@ def _seen(name: str, demand: str, answers: Mapping[str, Answer], wrong: Mapping[
 
 
 def _pair(name: str, demand: str, answers: Mapping[str, Answer], a: str, b: str) -> CheckResult | tuple[Answer, Answer]:
-    """Two answers to compare, or the finding that there are not two."""
+    """Two answers to compare, or the result of the check where one of them is missing."""
     one, two = answers[a], answers[b]
     if one.maps and two.maps:
         return one, two
@@ -147,7 +157,7 @@ def _mirrored(answers: Mapping[str, Answer]) -> CheckResult:
             continue
         trial = trials()[name]
         last = len(trial.views) - 1
-        # planes are a pixel of the field's pair apart
+        # half a plane: planes are at most one pixel of the field's pair apart, that is 1 / pair_steps per view step
         same = _agreeing(pair[0].maps[trial.ref], pair[1].maps[last - trial.ref][:, ::-1], 0.5 / trial.pair_steps)
         told.append(
             CheckResult("mirror", demand, "pass" if same.mean() >= AGREEMENT else "fail", f"{name} {same.mean():.2%}")

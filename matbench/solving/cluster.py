@@ -1,10 +1,11 @@
-"""The cells of a plan handed out by a Dask cluster.
+"""Solving the cells of a plan on a Dask cluster.
 
-Every worker solves its cells as they are solved here: each in a process of its own, watched by a keeper,
-in a folder of the worker's own. What comes back is that folder, as bytes. Scenes are not sent: a worker
-finds them in its own data folder, or in the one that is named here if it can see it, and compares
-digests. Users' own files of methods are sent. Dask itself exchanges tasks as pickles: whoever can reach
-its scheduler can run programs on the workers.
+A worker solves each cell as this machine would: in a process of its own, watched by a keeper, in a
+temporary folder. It sends that folder back as bytes. Users' own files with methods are sent to the worker.
+Scenes are not: the worker reads them from its own data folder, or from the one named here if it has that,
+and compares digests. A worker with other code or another scene declines the cell.
+
+Dask exchanges tasks as pickles: whoever can reach the scheduler can run programs on the workers.
 """
 
 import atexit
@@ -36,8 +37,8 @@ from matbench.solving.keeper import Keeper
 from matbench.solving.worker import Job
 from matbench.spec import first_line
 
-_PATIENCE = "10s"  # to reach the scheduler
-_TICK = 0.2  # seconds between two looks at whether a task is still wanted
+_PATIENCE = "10s"  # that the scheduler has to answer
+_TICK = 0.2  # seconds between two looks at whether the client still wants a task
 
 
 @frozen
@@ -47,9 +48,9 @@ class Task:
     Parameters
     ----------
     run
-        Distinguishes what belongs to one run from all else on the cluster.
+        The name of the run on the cluster: the topic of its events, and part of its tasks' keys.
     files
-        Name and content of the users' own files that hold methods.
+        Name and content of the users' own files with methods.
     """
 
     run: str
@@ -60,12 +61,16 @@ class Task:
 
 @frozen
 class Reply:
-    """What a worker has to say of a cell: the cell, or why it has declined it.
+    """A worker's reply: the solved cell, or why it declined to solve it.
 
     Parameters
     ----------
     worker
         The worker's address.
+    parcel
+        The cell's folder, packed (`matbench.runs.parcels`).
+    declined
+        The reason; empty if the cell was solved.
     """
 
     worker: str
@@ -80,15 +85,22 @@ def run_cells(
     todo: Sequence[Cell],
     tell: Callable[[Literal["start", "done"], Cell, Outcome | None], None],
 ) -> None:
-    """Have a cluster compute cells; each is put in its place as it comes, whole.
+    """Have a cluster solve cells, and put each into the run folder when it arrives.
 
-    A cell that a worker declines goes to another one; one whose workers die is tried again on
-    others, a few times. `KeyboardInterrupt` stops what runs, on the workers too.
+    A cell that one worker declines goes to another. A cell whose worker dies is tried again by Dask, a few
+    times. `KeyboardInterrupt` also stops the cells that run on the workers.
+
+    Parameters
+    ----------
+    todo
+        The cells of the plan to solve.
+    tell
+        Called as each cell starts and ends.
 
     Raises
     ------
     UserError
-        If the cluster cannot be had.
+        If the cluster cannot be reached, or Dask is not installed.
     """
     if settings.dask == "local":
         settings = evolve(settings, threads=settings.threads_each(), memory=settings.memory_each())
@@ -99,7 +111,7 @@ def run_cells(
         arriving = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         this_run = f"matbench-{uuid4().hex}"
         waiting = {cell.key: cell for cell in todo}
-        telling = Lock()  # that a cell starts is heard in a thread of the client
+        telling = Lock()  # a cell's start is reported in a thread of the Dask client, its end in this one
         tasks: dict[str, tuple[Task, list[Reply]]] = {}
         futures: dict[str, Any] = {}
 
@@ -109,12 +121,14 @@ def run_cells(
                     tell("start", cell, None)
 
         def ends(cell: Cell, outcome: Outcome) -> None:
-            begins(cell.key)
+            begins(cell.key)  # events may be late or lost; a start is told before an end all the same
             with telling:
                 tell("done", cell, outcome)
 
         def submit(task: Task, before: list[Reply]) -> None:
+            # other workers stay allowed: without that, a task waits for ever if the preferred ones leave the cluster
             chosen = {"workers": _other_workers(client, before), "allow_other_workers": True} if before else {}
+            # pure=False and a key of its own: Dask would else return an earlier run's result of the same task
             future = client.submit(solve_task, task, key=(this_run, task.cell.key, len(before)), pure=False, **chosen)
             tasks[future.key], futures[future.key] = (task, before), future
             arriving.add(future)
@@ -132,12 +146,12 @@ def run_cells(
                 ends(task.cell, _keep_reply(store, task.cell, future, reply, before))
         finally:
             with telling:
-                waiting.clear()
+                waiting.clear()  # late events tell nothing any more
             client.cancel(list(futures.values()), force=True)
 
 
 def _other_workers(client: Any, declined: Sequence[Reply]) -> list[str]:
-    """The workers that have not declined; none once one of them has declined twice."""
+    """The workers that have not declined the cell; none if one declined twice: then nobody else is left to ask."""
     tried = [reply.worker for reply in declined]
     if len(set(tried)) < len(tried):
         return []
@@ -145,7 +159,7 @@ def _other_workers(client: Any, declined: Sequence[Reply]) -> list[str]:
 
 
 def _keep_reply(store: Store, cell: Cell, future: Any, reply: Any, before: Sequence[Reply]) -> Outcome:
-    """Put what came in its place, or say why nothing came."""
+    """Put an arrived cell into the run folder; its outcome, or the outcome that says why none came."""
     wrong = Outcome("failed", alone=False)
     if future.status == "finished" and not reply.declined:
         try:
@@ -164,13 +178,13 @@ def _keep_reply(store: Store, cell: Cell, future: Any, reply: Any, before: Seque
 
 @contextmanager
 def _client(settings: Settings) -> Iterator[Any]:
-    """A client of the cluster that the settings name; a local cluster ends with it."""
+    """A client of the cluster that the settings name. A local cluster is started, and ends with the client."""
     try:
         from distributed import Client, LocalCluster
     except ImportError as error:
         raise UserError("--dask needs Dask: pip install 'matbench-stereo[cluster]'") from error
 
-    for name in ("distributed", "distributed.client"):  # what goes wrong is told in the cells
+    for name in ("distributed", "distributed.client"):  # failures are told as the cells' outcomes
         logging.getLogger(name).setLevel(logging.CRITICAL)
     cluster: Any = None
     try:
@@ -185,7 +199,7 @@ def _client(settings: Settings) -> Iterator[Any]:
         raise UserError(
             f"Dask scheduler {settings.dask!r} cannot be reached: write tcp://HOST:PORT of one that runs, or local"
         ) from error
-    patience = 2  # who interrupts will not wait for long
+    patience = 2  # seconds to close after Ctrl-C, when a user will not wait; more after a whole run
     try:
         yield client
         patience = 10
@@ -200,7 +214,7 @@ def _client(settings: Settings) -> Iterator[Any]:
 
 
 def solve_task(task: Task) -> Reply:
-    """Solve a cell on a Dask worker."""
+    """Solve a cell. This runs on a Dask worker."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -228,7 +242,10 @@ def solve_task(task: Task) -> Reply:
 
 
 def _have_solved(job: Job, worker: Any, key: Any) -> Outcome:
-    """Have a keeper solve a cell; it is dismissed where nobody wants the cell any more."""
+    """Have a keeper of this worker solve a cell; dismiss the keeper if the client has cancelled the task.
+
+    Dask cannot interrupt a task that runs, so the task itself looks whether it is still wanted.
+    """
     keeper = _keepers.get()
     lives = False
     try:
@@ -249,7 +266,15 @@ def _have_solved(job: Job, worker: Any, key: Any) -> Outcome:
 
 @define
 class Keepers:
-    """The keepers of this worker: as many as cells have run at once."""
+    """The keepers of this worker process, kept for later cells: at most as many as cells have run at once.
+
+    Parameters
+    ----------
+    free
+        Those that have no cell now.
+    starting
+        Held while one is started, as that changes the state of the whole process for a moment.
+    """
 
     free: "SimpleQueue[Keeper]"
     starting: Lock
@@ -261,7 +286,8 @@ class Keepers:
         from matbench.runs.provenance import commit_known
         from matbench.solving.environment import kernel_cache_in_use, without_main
 
-        # Dask's workers are daemons, which may have no children lest they leave orphans; keepers end with their parent
+        # Dask's workers are daemonic processes, which `multiprocessing` lets start no children, as these could
+        # outlive them. Keepers cannot: they end with their line. So the mark is taken off for this moment.
         with self.starting, without_main(), kernel_cache_in_use(), commit_known():
             config = current_process()._config  # type: ignore[attr-defined]
             before = config.get("daemon")
@@ -272,12 +298,14 @@ class Keepers:
                 config["daemon"] = before
 
     def dismiss(self) -> None:
+        """End all free keepers."""
         with suppress(Empty):
             while True:
                 self.free.get_nowait().dismiss()
 
 
 def _built_in() -> list[str]:
+    """The modules of all built-in methods and datasets: a worker does not know which cells it will be given."""
     every = [*plugins.installed("algorithms").values(), *plugins.installed("datasets").values()]
     entries = [plugin.entry for plugin in every if plugin.source == "matbench-stereo"]
     return [entry.module for entry in entries if not isinstance(entry, type)]
@@ -288,10 +316,10 @@ atexit.register(_keepers.dismiss)
 
 
 def _write_files(files: Sequence[tuple[str, bytes]], folder: Path) -> tuple[str, ...]:
-    """The paths of users' files as they came, each in a folder of its own; their names count in digests."""
+    """Write the users' files, each into a folder of its own: names may be equal, and count in digests. Their paths."""
     paths = []
     for number, (name, content) in enumerate(files):
-        if Path(name).name != name:
+        if Path(name).name != name:  # a name such as ../x would be written elsewhere
             raise ValueError(f"{name!r} is no file name")
         path = folder / str(number) / name
         path.parent.mkdir()
@@ -301,7 +329,7 @@ def _write_files(files: Sequence[tuple[str, bytes]], folder: Path) -> tuple[str,
 
 
 def _data_folder(named: Path | None) -> Path | None:
-    """This worker's folder of real scenes: its own, else the one named by whoever asks, if it is here."""
+    """This worker's folder of real scenes: its own, else the one that the client names if it exists here."""
     with suppress(UserError):
         own = data_root()
         if own is not None:
@@ -310,7 +338,7 @@ def _data_folder(named: Path | None) -> Path | None:
 
 
 def _why_declined(cell: Cell, files: Sequence[str], root: Path | None) -> str:
-    """Why this worker would solve something else: it has other code, or not the scene; empty if it would not."""
+    """Why this worker must decline: it has other code, or lacks the scene or has another; empty if it need not."""
     name, known = cell.method.algorithm, plugins.installed("algorithms")
     candidates = [plugins.Plugin(name, file, object) for file in files]
     candidates += [known[name]] if name in known else []
@@ -333,12 +361,12 @@ def _why_declined(cell: Cell, files: Sequence[str], root: Path | None) -> str:
 
 
 def _code_digest(cell: Cell, files: Sequence[str]) -> str:
-    """The digest of a cell's method, and of the files that it names: to know these, the method is imported."""
+    """The digest of a cell's method and of the files that it names; an instance is built, as only that names them."""
     plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in files])
     return plugins.method_digest(plugin, spec.build(plugin.name, plugin.load(), cell.method.params))
 
 
 @cache
 def _scene_digest(scene: str, root: Path | None) -> str:
-    """A scene's digest on this machine."""
+    """The digest of a scene as this machine has it."""
     return load_scene(scene, root).digest

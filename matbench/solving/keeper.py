@@ -1,9 +1,11 @@
-"""Keepers: processes that run no method but watch, from outside, the process that does.
+"""Keepers: processes that run no method themselves but watch the process that does.
 
-A keeper solves one cell at a time. It forks a process for it, takes in what that prints, counts its
-seconds and its memory, and ends it with all that it started if it takes more than it may. The cell's
-folder is the keeper's: whatever becomes of the method, log and outcome are written. A keeper ends,
-and ends all below it, as soon as nobody holds the other end of its line, so nothing outlives a run.
+For each cell a keeper forks a child process that runs the method. The keeper stores what the child
+prints, and measures its time and memory. A child that exceeds a limit is killed with all that it has
+started. The keeper owns the cell's folder, so log and outcome are written whatever the method does.
+
+A keeper is connected to the run by a pipe, its line. When the other end of the line closes, even because
+the run was killed, the keeper kills everything below it and ends. So nothing outlives a run.
 """
 
 import json
@@ -28,20 +30,28 @@ from matbench.solving.worker import Job, serve
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerProcess
 
-LOG_ENDS = 1 << 16  # bytes kept of the beginning, and of the end, of what a cell prints
+LOG_ENDS = 1 << 16  # bytes kept of the beginning, and of the end, of a cell's output: a method may print without end
 _TICK = 0.05  # seconds between two looks at a process
-_TREE_LOOKS = 10  # every so many looks also at those that it started
-_STACK_SECONDS = 0.5  # seconds that a process which is ended has to say where it was
-_PATIENCE = 5.0  # seconds that a keeper has to clear away
+_TREE_LOOKS = 10  # every tenth look includes the processes that it started: these take longer to find and to measure
+_STACK_SECONDS = 0.5  # that a process has to print its stack before it is killed
+_PATIENCE = 5.0  # seconds that a dismissed keeper has to end its processes
 
 
 class Dismissed(Exception):
-    """The keeper's line has ended."""
+    """Nobody holds the other end of the keeper's line any more."""
 
 
 @define
 class Log:
-    """The first and the last of what a process prints."""
+    """The first and the last `LOG_ENDS` bytes that a process prints.
+
+    Parameters
+    ----------
+    source
+        The file descriptor to read, not blocking.
+    left_out
+        How many bytes between the two were dropped.
+    """
 
     source: int
     first: bytearray = field(factory=bytearray)
@@ -49,7 +59,7 @@ class Log:
     left_out: int = 0
 
     def take(self) -> bool:
-        """Take in what there is; False if there is nothing."""
+        """Read what is there now; False if that is nothing."""
         try:
             found = os.read(self.source, LOG_ENDS)
         except BlockingIOError:
@@ -63,8 +73,8 @@ class Log:
         return bool(found)
 
     def drain(self) -> None:
-        """Take in what is left, as far as that is of use."""
-        for _ in range(64):
+        """Read what is left in the pipe."""
+        for _ in range(64):  # a process that has escaped may go on printing: not for ever
             if not self.take():
                 return
 
@@ -78,15 +88,22 @@ class Log:
 
 @define
 class Child:
-    """The process that runs methods, seen from its keeper.
+    """The process that runs methods, as its keeper sees it.
 
     Parameters
     ----------
+    line
+        The pipe for jobs and answers.
+    output
+        The file descriptor of what it prints.
     first
         The job by whose settings it is confined.
+    is_fit
+        May it solve another cell? It says so itself.
     heard
-        What it has said on its line so far. Nobody knows what a method writes there: it is read as text,
-        as far as there is any, and never waited for.
+        The part of an answer that has come so far. A method may write anything into this pipe by mistake.
+        So answers are lines of JSON, never pickles, and the keeper reads what is there and never waits
+        for more.
     """
 
     pid: int
@@ -98,40 +115,45 @@ class Child:
 
     @classmethod
     def fork(cls, job: Job, inbox: Connection) -> "Child":
+        """Start a child that solves the cells sent to it. In the child this never returns.
+
+        It is forked from the keeper, which has the libraries loaded already and runs one thread only.
+        """
         line, theirs = Pipe()
         output, printed = os.pipe()
         keeper = os.getpid()
         pid = os.fork()
         if not pid:
             try:
-                os.setsid()
+                os.setsid()  # a method that signals its process group must not reach the keeper
                 processes.die_with_parent(keeper)
+                # an end that stayed open here would keep the pipe alive when the keeper or the run has gone
                 for ours in (inbox, line):
                     ours.close()
                 os.close(output)
                 serve(theirs, printed, job)
             finally:
-                os._exit(1)
+                os._exit(1)  # never back into the keeper's own code, a copy of which this process has
         theirs.close()
         os.close(printed)
         os.set_blocking(output, False)
         return cls(pid, line, output, job)
 
     def suits(self, job: Job) -> bool:
-        """Is another job confined as the first one was, and content with a process that is not its own?"""
+        """May another job be solved here: is its isolation "shared", with the same threads and memory limit?"""
         first = self.first
         same = (job.threads, job.settings.memory_each()) == (first.threads, first.settings.memory_each())
         return same and job.settings.isolation == "shared"
 
     def answer(self) -> str | None:
-        """What it says of its cell (`matbench.solving.worker.serve`), None until it has said all of it.
+        """The answer for its cell (`matbench.solving.worker.serve`); None while it is not complete.
 
         Raises
         ------
         EOFError
-            If nothing more can come.
+            If the child has closed its end: no answer will come.
         ValueError
-            If it is no answer.
+            If what came is not an answer.
         """
         found = os.read(self.line.fileno(), LOG_ENDS)
         if not found:
@@ -155,10 +177,13 @@ class Child:
 
 
 def keep(inbox: Connection) -> None:
-    """Solve the cells of the jobs that come in, one by one; send "" after each, or why it could not be written."""
+    """The keeper's process: solve the jobs that come in, one by one, until the line ends.
+
+    It sends "" after each cell, or why the cell could not be written.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
-    processes.lead_own_session()  # Ctrl-C is for whoever holds the line
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # through `finally`: the child goes, too
+    processes.lead_own_session()  # Ctrl-C is for the run, which then dismisses its keepers
     child: Child | None = None
     try:
         while True:
@@ -177,7 +202,7 @@ def keep(inbox: Connection) -> None:
 
 
 def _solve_cell(job: Job, inbox: Connection, child: Child | None) -> Child | None:
-    """Solve a cell; the child, if it is to solve the next one, too."""
+    """Solve a cell, by `child` if it suits, else by a new one; return the child if it may solve the next cell, too."""
     store = Store(job.run)
     if child is not None and not child.suits(job):
         processes.kill_descendants()
@@ -188,28 +213,34 @@ def _solve_cell(job: Job, inbox: Connection, child: Child | None) -> Child | Non
             stays = _attempt(job, draft.resolve(), inbox, child)
             if stays or stays is None:
                 return child if stays else None
-            _empty(draft)  # what went before may be to blame: once more, in a fresh process
+            # earlier cells may have spoiled a shared process: this cell gets a second chance in a fresh one.
+            # Not after a timeout: the cell would take the whole time again.
+            _empty(draft)
         child = Child.fork(job, inbox)
         return child if _attempt(job, draft.resolve(), inbox, child) else None
 
 
 def _attempt(job: Job, draft: Path, inbox: Connection, child: Child) -> bool | None:
-    """Fill a cell's folder; whether the child is fit for another cell, None where it took too long.
+    """Have `child` solve a cell and fill its folder.
 
-    A child that is not fit is ended, with all that it started.
+    Returns
+    -------
+    Whether the child may solve another cell; None if this one ran into its time limit. A child that may
+    not is killed, with all that it has started.
     """
     log, stays = Log(child.output), False
     try:
         outcome = _watch(job, draft, inbox, child, log)
         stays = outcome is None and child.is_fit and job.settings.isolation == "shared"
     finally:
+        # first kill, then drain, then close: else output is lost, or the child still prints into a closed pipe
         if not stays:
             processes.kill_descendants()
         log.drain()
         if not stays:
             child.close()
     if outcome is not None:
-        _empty(draft)
+        _empty(draft)  # of what the child had half written
         write_cell(draft, job.cell, evolve(outcome, threads=job.threads, alone=job.alone))
     (draft / "log.txt").write_bytes(log.whole())
     return None if outcome is not None and outcome.status == "timeout" else stays
@@ -224,12 +255,12 @@ def _empty(draft: Path) -> None:
 
 
 def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> Outcome | None:
-    """Wait until the child has written the cell: None, or what is to be written instead.
+    """Wait for the child; None if it has written the cell, else the outcome to write in its place.
 
     Raises
     ------
     Dismissed
-        If the line ends meanwhile.
+        If the run has gone or wants no more.
     OSError
         If the child could not write the cell.
     """
@@ -237,15 +268,15 @@ def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> 
     limit, memory = job.settings.timeout, job.settings.memory_each()
     kills = processes.kills_for_memory()
     sources: list[Any] = [inbox, child.output, child.line]
-    with suppress(OSError):  # it has ended already
+    with suppress(OSError):  # it has ended already: seen below
         child.line.send((job, draft))
     looks, next_look = 0, begin
     while True:
         ready = wait(sources, _TICK)
-        if inbox in ready:
+        if inbox in ready:  # no second job comes before the answer: it can only be the end
             raise Dismissed
         if child.output in ready and not log.take():
-            sources.remove(child.output)
+            sources.remove(child.output)  # a closed pipe is always ready, and `wait` would not wait any more
         if child.line in ready:
             try:
                 said = child.answer()
@@ -267,6 +298,7 @@ def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> 
             return Outcome("timeout", reason=f"stopped after {limit:g} s")
         if now < next_look:
             continue
+        # a method that prints all the time wakes `wait` at once; its memory is still read every _TICK only
         looks, next_look = looks + 1, now + _TICK
         used = processes.memory_used(child.pid, whole_tree=looks % _TREE_LOOKS == 0)
         if used > memory:
@@ -275,9 +307,9 @@ def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> 
 
 
 def _how_it_ended(status: int, log: Log, kills: int) -> Outcome:
-    """What became of a child that has ended by itself, or was ended by the system."""
+    """The outcome for a child that ended before it answered, by itself or by the system."""
     code = os.waitstatus_to_exitcode(status)
-    if b"std::bad_alloc" in log:
+    if b"std::bad_alloc" in log:  # C++ that meets the memory limit aborts: only its message tells this from a crash
         return Outcome("out-of-memory", reason="the method ended its process: std::bad_alloc")
     if code == -signal.SIGKILL and processes.kills_for_memory() > kills:
         return Outcome("out-of-memory", reason="the system ended the method's process: memory had run out")
@@ -289,7 +321,10 @@ def _how_it_ended(status: int, log: Log, kills: int) -> Outcome:
 
 
 def _print_stack(child: Child, log: Log) -> None:
-    """Have the child print where it is (`faulthandler`)."""
+    """Have the child print its stack into the log: SIGABRT makes `faulthandler` do so.
+
+    Whoever reads the log then sees where the method hung, or what took the memory.
+    """
     with suppress(ProcessLookupError):
         os.kill(child.pid, signal.SIGABRT)
     end = time.monotonic() + _STACK_SECONDS
@@ -299,22 +334,28 @@ def _print_stack(child: Child, log: Log) -> None:
 
 
 class Keeper:
-    """A keeper's process, from outside; forked from a small server that has imported the libraries once."""
+    """A handle on a keeper's process, held by the run. It is forked from the server of `processes.start_server`.
+
+    Parameters
+    ----------
+    preload
+        Modules that the server imports besides the harness.
+    """
 
     def __init__(self, preload: Iterable[str] = ()) -> None:
         processes.start_server(["matbench.solving.keeper", "cv2", "threadpoolctl", *preload])
         self.line, theirs = Pipe()
         self._process: ForkServerProcess = get_context("forkserver").Process(target=keep, args=(theirs,))
         self._process.start()
-        theirs.close()
+        theirs.close()  # else this process itself would keep the line open when the keeper dies
 
     def begin(self, job: Job) -> None:
-        """Begin with a cell; `line` tells when there is an answer."""
+        """Start a cell. `line` becomes readable when `outcome` has an answer."""
         with suppress(ConnectionError):  # `outcome` says so
             self.line.send(job)
 
     def outcome(self, job: Job) -> tuple[Outcome, bool]:
-        """What has become of the cell, and whether this keeper can go on."""
+        """Wait for the answer: the cell's outcome, and whether this keeper is still alive."""
         wrong = Outcome("failed", threads=job.threads, alone=job.alone)
         try:
             said = self.line.recv()
@@ -326,11 +367,11 @@ class Keeper:
         return found or evolve(wrong, reason="the cell's process left no result"), True
 
     def dismiss(self) -> None:
-        """Tell it to stop whatever it does and clear away; `wait` waits for that."""
+        """Tell the keeper to kill its processes and end; does not wait for it."""
         self.line.close()
 
     def wait(self) -> None:
-        """Wait until a dismissed keeper is gone."""
+        """Wait until a dismissed keeper has ended; after `_PATIENCE` seconds kill it."""
         self._process.join(_PATIENCE)
         if self._process.is_alive():
             self._process.kill()
@@ -338,8 +379,8 @@ class Keeper:
 
 
 def dismiss(keepers: Iterable[Keeper]) -> None:
-    """End keepers and all below them."""
-    every = list(keepers)
+    """End keepers and all that runs below them."""
+    every = list(keepers)  # told all before waiting for the first: they clear away at the same time
     for one in every:
         one.dismiss()
     for one in every:

@@ -1,7 +1,7 @@
-"""Does a method keep its promises to the harness (`matbench check`)? It is tried on small scenes and judged.
+"""`matbench check`: does a method keep its promises to the harness? It is tried on small scenes and judged.
 
 The scenes are in `matbench.solving.check_scenes`, one solve in a process of its own is in
-`matbench.solving.check_solve`, the verdicts are in `matbench.solving.check_verdicts`.
+`matbench.solving.check_solve`, and the verdicts are in `matbench.solving.check_verdicts`.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,11 +27,15 @@ def check(
     Parameters
     ----------
     files
-        The users' own files that hold methods.
+        The users' own files with methods.
     timeout
         Seconds that one solve may take; if the first one takes longer, nothing else is tried.
     listen
-        Told how many trials are done, how many there are, and the name of the next.
+        Called before each trial: how many are done, how many there are, and the name of the next.
+
+    Returns
+    -------
+    One result for each check, always the same checks in the same order.
     """
     entry = plugins.algorithm(method.algorithm, files).entry
     wanted, answers = trials(), {}

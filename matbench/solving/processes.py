@@ -1,4 +1,4 @@
-"""Processes and what they may take, as the system measures and enforces it."""
+"""Processes: the memory that they use, the limits that they get, and how they are ended with all they started."""
 
 import ctypes
 import os
@@ -13,20 +13,22 @@ from pathlib import Path
 import psutil
 
 _MIB = 1 << 20
-_SLACK = 256  # MiB beyond the limit, for stacks and arenas of threads
-_DEATH_SIGNAL, _CHILD_SUBREAPER = 1, 36  # prctl(2)
+# MiB added to the hard limit: threads reserve stacks and arenas that they never touch. The keeper ends
+# a process that really holds more than its limit; this limit only stops allocations far beyond it.
+_SLACK = 256
+_DEATH_SIGNAL, _CHILD_SUBREAPER = 1, 36  # PR_SET_PDEATHSIG and PR_SET_CHILD_SUBREAPER of prctl(2)
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
 
 def memory_used(pid: int, whole_tree: bool = True) -> float:
-    """MiB of resident memory of a process and all below it; what they share counts once.
+    """Resident memory, in MiB, of a process and, with `whole_tree`, of all its descendants.
 
-    A process that has just ended has none.
+    Memory that several of them share counts once. A process that has just ended has none.
     """
     try:
         process = psutil.Process(pid)
         tree = [process, *(process.children(recursive=True) if whole_tree else ())]
-        if len(tree) == 1:
+        if len(tree) == 1:  # by far the quickest to read; sharing matters only among several
             return float(process.memory_info().rss / _MIB)
         return sum(_proportional_size(one) for one in tree) / _MIB
     except psutil.Error:
@@ -34,6 +36,7 @@ def memory_used(pid: int, whole_tree: bool = True) -> float:
 
 
 def _proportional_size(process: psutil.Process) -> int:
+    """Bytes of a process, shared pages divided among those that share them (PSS); else its resident bytes."""
     with suppress(psutil.Error, AttributeError):
         return int(process.memory_full_info().pss)
     with suppress(psutil.Error):
@@ -42,7 +45,7 @@ def _proportional_size(process: psutil.Process) -> int:
 
 
 def kills_for_memory() -> int:
-    """How often the system has ended a process since it was started, because memory had run out (Linux)."""
+    """How many processes Linux has killed since it booted because memory had run out; 0 where that is not known."""
     with suppress(OSError):
         for line in Path("/proc/vmstat").read_text().splitlines():
             if line.startswith("oom_kill "):
@@ -51,23 +54,26 @@ def kills_for_memory() -> int:
 
 
 def confine(memory: int) -> None:
-    """Refuse this process, and those that it starts, more private memory than `memory` MiB from now on.
+    """Limit this process, and those that it starts, to `memory` MiB of further private memory.
 
-    A runaway allocation is then a `MemoryError` where it happens, before it has taken anything. If
+    A runaway allocation then raises `MemoryError` where it happens, before it has taken anything. If
     the machine runs out of memory all the same, the system ends this process first. It leaves no core file.
     """
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a core file is as large as the memory, and nobody reads it
     with suppress(OSError, ValueError):
+        # 1000 is the highest: the system chooses this process before the harness or anything else of the user's
         Path("/proc/self/oom_score_adj").write_text("1000")
     with suppress(OSError, ValueError, StopIteration):
         lines = Path("/proc/self/status").read_text().splitlines()
+        # not RLIMIT_AS: that counts reserved addresses, of which numba, OpenCV and threads take many and use few.
+        # The limit counts what the process has already inherited, so that is added.
         now = next(int(line.split()[1]) for line in lines if line.startswith("VmData:")) // 1024
         limit = (now + memory + _SLACK) * _MIB
         resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
 def use_threads(count: int) -> None:
-    """Have the libraries that share out work use that many threads: those loaded, and those loaded later."""
+    """Have all numerical libraries use `count` threads: those loaded already, and those loaded later."""
     import cv2
     import threadpoolctl
 
@@ -78,20 +84,25 @@ def use_threads(count: int) -> None:
     if "numba" in sys.modules:
         import numba
 
+        # numba has fixed its largest number of threads when it was imported, and refuses more
         numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     else:
         os.environ["NUMBA_NUM_THREADS"] = str(count)
 
 
 def start_server(preload: Iterable[str]) -> None:
-    """Start the server that processes are forked from, unless it runs already.
+    """Start the fork server, the process that all keepers are forked from, unless it runs already.
 
-    It is not interrupted by Ctrl-C while it imports what is to be there in all of them.
+    It imports the modules of `preload` once, and every forked process has them at once. A plain fork of
+    this process would copy its threads' locks in whatever state they are, and may hang; a spawned process
+    would import numba and OpenCV again for every cell, which takes seconds.
     """
     get_context("forkserver").set_forkserver_preload(list(preload))
+    # Ctrl-C reaches the whole foreground group: it would end the server in the middle of its imports, with a
+    # traceback. A new process inherits the blocked signal; keepers unblock it (`lead_own_session`).
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     warnings = os.environ.get("PYTHONWARNINGS")
-    # it clears away the semaphores of processes that were ended, and need not tell people
+    # its resource tracker warns of semaphores that killed processes have left: that is expected, and it removes them
     os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [warnings, "ignore:resource_tracker:UserWarning"]))
     try:
         forkserver.ensure_running()
@@ -104,15 +115,20 @@ def start_server(preload: Iterable[str]) -> None:
 
 
 def lead_own_session() -> None:
-    """Lead a session, which Ctrl-C does not reach, and adopt what the processes below leave behind (Linux)."""
+    """Start a session of one's own, which Ctrl-C does not reach, and adopt orphaned descendants (Linux).
+
+    A process whose parent has ended is adopted by the nearest subreaper above it instead of by init. So
+    `kill_descendants` finds what a method has started even where the method detached it.
+    """
     os.setsid()
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # `start_server` has it blocked
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # blocked by `start_server`
     _prctl(_CHILD_SUBREAPER, 1)
 
 
 def die_with_parent(parent: int) -> None:
-    """Have the system end this process when its parent, process `parent`, ends, however it does (Linux)."""
-    _prctl(_DEATH_SIGNAL, signal.SIGKILL)
+    """Have the system kill this process as soon as its parent, process `parent`, ends in any way (Linux)."""
+    _prctl(_DEATH_SIGNAL, signal.SIGKILL)  # a method may ignore every other signal
+    # the parent may have ended between the fork and the line above: then no signal will come
     if os.getppid() != parent:
         os._exit(1)
 
@@ -123,8 +139,8 @@ def _prctl(option: int, value: int) -> None:
 
 
 def kill_descendants() -> None:
-    """Kill every process below this one, and those that they start meanwhile, and wait until they are gone."""
-    for _ in range(1000):
+    """Kill all descendants of this process, those started meanwhile too, and wait until they are gone."""
+    for _ in range(1000):  # a method may fork faster than one round kills; it must not keep the harness here for ever
         below = psutil.Process().children(recursive=True)
         for process in below:
             with suppress(psutil.Error):
@@ -133,11 +149,11 @@ def kill_descendants() -> None:
         if not below:
             return
         with suppress(ChildProcessError):
-            os.waitpid(-1, 0)
+            os.waitpid(-1, 0)  # sleep until one is gone instead of looking again and again
 
 
 def reap() -> Mapping[int, int]:
-    """Processes below this one that have ended -> their wait status."""
+    """Collect the children that have ended: process id -> wait status. Until then they stay as zombies."""
     ended = {}
     with suppress(ChildProcessError):
         while (found := os.waitpid(-1, os.WNOHANG))[0]:

@@ -1,4 +1,4 @@
-"""Working through a plan: each cell in a process of its own, results as they come."""
+"""Computing the cells of a plan: each in a process of its own, here or on a cluster."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -27,27 +27,28 @@ def run(
 ) -> None:
     """Compute every cell of a plan that is not done.
 
-    One cell at a time unless the settings say otherwise, so that seconds are comparable. Each is
-    solved in a process that a keeper watches (`matbench.solving.keeper`), or on a cluster
-    (`matbench.solving.cluster`); whatever a method does costs that cell alone. `KeyboardInterrupt` ends
-    the cells under way and is passed on; what is finished stays.
+    One cell runs at a time unless the settings say otherwise: only then are seconds comparable. Each cell
+    is solved in a process that a keeper watches (`matbench.solving.keeper`), or on a cluster
+    (`matbench.solving.cluster`), so a method that crashes or hangs costs one cell and no other.
+    `KeyboardInterrupt` ends the running cells and is passed on; finished cells stay.
+
+    Parameters
+    ----------
+    preload
+        Modules to import once for all cells besides the harness, such as those of the methods.
+    listen
+        Called as each cell starts and ends.
 
     Raises
     ------
     FolderLost
         If cells cannot be written.
-
-    Parameters
-    ----------
-    preload
-        Modules that are imported once for all cells, besides the harness, such as those of the methods.
-    listen
-        Told as each cell starts and ends.
     """
     told = listen or (lambda *_: None)
 
     def tell(event: Event, cell: Cell, outcome: Outcome | None) -> None:
-        if outcome is not None and store.outcome(cell, whole=False) != outcome:  # what was solved could not be kept
+        if outcome is not None and store.outcome(cell, whole=False) != outcome:
+            # the cell's folder holds something else: the outcome was never written there (crash, full disk, cluster)
             store.try_out()
             with store.building(cell) as draft:
                 write_cell(draft, cell, outcome)
@@ -68,7 +69,7 @@ def run(
 
 
 def _dataset_modules(cells: Iterable[Cell]) -> list[str]:
-    """The modules that load the cells' scenes."""
+    """The modules of the datasets that load the cells' scenes."""
     known = plugins.installed("datasets")
     prefixes = dict.fromkeys(cell.scene.partition("/")[0] for cell in cells)
     entries = [known[prefix].entry for prefix in prefixes if prefix in known]
@@ -78,13 +79,14 @@ def _dataset_modules(cells: Iterable[Cell]) -> list[str]:
 def _run_here(
     plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Iterable[Cell], tell: Listener
 ) -> None:
-    """Share out cells to keepers on this machine."""
+    """Solve cells on this machine, as many at once as the settings say."""
     jobs = [
         Job(store.folder.resolve(), cell, plan.plugin_files, settings.threads_each(), settings, settings.jobs == 1)
         for cell in todo
     ]
     waiting = deque(jobs)
     preload = [*preload, *_dataset_modules(job.cell for job in jobs)]
+    # a keeper lives through many cells: starting one takes longer than solving a small scene
     free: list[Keeper] = []
     busy: dict[Any, tuple[Keeper, Job]] = {}
     try:
@@ -98,7 +100,7 @@ def _run_here(
             for line in wait(list(busy)):
                 keeper, job = busy[line]
                 outcome, lives = keeper.outcome(job)
-                if not lives:
+                if not lives:  # it was killed itself, by the system for want of memory, say
                     dismiss([keeper])
                 del busy[line]
                 free.append(keeper if lives else Keeper(preload))

@@ -1,4 +1,4 @@
-"""Solving cells, in a process that a keeper watches."""
+"""Solving cells: what happens in the child process that a keeper watches. Here, and only here, methods run."""
 
 import ctypes
 import faulthandler
@@ -32,21 +32,21 @@ from matbench.scenes.catalogue import load_scene
 from matbench.solving import processes
 from matbench.spec import first_line
 
-_TINY = 16, 64  # rows and columns of the scene that methods are compiled on
+_TINY = 16, 64  # rows and columns of the crop for the first, untimed solve, which compiles the kernels
 
 
 @frozen
 class Job:
-    """All that a cell's process needs; small, no arrays.
+    """What a process needs to solve a cell. It is pickled, so it holds names and settings, no arrays.
 
     Parameters
     ----------
     run
         The run folder.
     threads
-        How many the method is given.
+        How many threads the method may use.
     alone
-        Does no other cell of the run run meanwhile?
+        Is it the only cell of the run that is solved at this time? Else its seconds do not compare.
     """
 
     run: Path
@@ -58,7 +58,7 @@ class Job:
 
 
 def tiny(scene: Scene) -> Scene:
-    """A corner of a scene: same views, types and range, few pixels."""
+    """The top left corner of a scene: the same views, types and range, few pixels."""
     rows, columns = (min(a, b) for a, b in zip(_TINY, (scene.height, scene.width), strict=True))
     return evolve(
         scene,
@@ -70,7 +70,7 @@ def tiny(scene: Scene) -> Scene:
 
 
 def hide_truth(scene: Scene) -> Scene:
-    """The scene as a method may see it: no ground truth and nothing that follows from it, no view held out."""
+    """The scene as a method may see it: without ground truth, regions, visibility and the held-out view."""
     return evolve(scene, truth={}, regions={}, visible={}, held_out=None)
 
 
@@ -80,7 +80,7 @@ def checked(estimate: Any, scene: Scene) -> dict[int, NDArray[np.float32]]:
     Raises
     ------
     TypeError, ValueError
-        If the method returned something else than an `Estimate` with whole maps.
+        If the method returned anything but an `Estimate` with maps of the scene's size.
     """
     if not isinstance(estimate, Estimate):
         raise TypeError(f"solve returned {type(estimate).__name__}, not an Estimate")
@@ -100,12 +100,13 @@ def checked(estimate: Any, scene: Scene) -> dict[int, NDArray[np.float32]]:
 
 
 def _reset_peak() -> None:
+    """Let the peak of memory start anew, so that the warm-up and earlier cells do not count (Linux)."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
 
 
 def _peak_mb() -> float:
-    """Largest resident memory since `_reset_peak` (Linux), else since the process began, in MiB."""
+    """Largest resident memory in MiB: since `_reset_peak` on Linux, elsewhere since the process began."""
     with suppress(OSError):
         for line in Path("/proc/self/status").read_text().splitlines():
             if line.startswith("VmHWM:"):
@@ -114,7 +115,7 @@ def _peak_mb() -> float:
 
 
 def _volume(estimate: Estimate, scene: Scene) -> StoredVolume | None:
-    """The estimate's volume as it is kept; None where it has none of that kind, which is said in the log."""
+    """The estimate's volume as it is stored; None if it has none, or one that cannot be stored: the log says why."""
     if estimate.volume is None:
         return None
     try:
@@ -135,10 +136,11 @@ def _solve(
     if reason:
         return Outcome("skipped", reason=str(reason)), None, None
     context = Context(job.cell.seed, job.threads)
+    # numba compiles on the first call: a first solve on a small crop keeps that out of the timed one
     start = time.perf_counter()
     try:
         warm = method.solve(tiny(scene), context)
-    except Exception:  # too small for this method, which nobody asked it to solve
+    except Exception:  # the crop may be too small for this method, and nobody asked for it: no failure
         warm = method.solve(scene, context)
     warmed = time.perf_counter()
     _reset_peak()
@@ -156,7 +158,13 @@ def _solve(
 
 
 def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcome:
-    """Solve again, recorded; the outcome with what was, or why there is no recording: the answer itself stands."""
+    """Solve a second time with a probe and write the recording.
+
+    Returns
+    -------
+    The outcome, with what was recorded, or with the reason why there is no recording. The answer of the
+    first solve stays: a recording that fails costs no score.
+    """
     from matbench.recording.rrd import record
 
     assert job.settings.record is not None, "the caller has looked"  # noqa: S101
@@ -175,26 +183,28 @@ def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcom
 
 
 def run_cell(job: Job, draft: Path) -> Outcome:
-    """Solve a cell and fill its folder, whatever the method raises."""
+    """Solve a cell and fill its folder, whatever the method raises; the outcome."""
     cell, process, place = job.cell, os.getpid(), Path.cwd()
     maps = volume = None
     try:
         plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
         method = spec.build(plugin.name, plugin.load(), cell.method.params)
+        # files may have been edited since the plan was made: results must not stand under the old digest
         if plugins.method_digest(plugin, method) != cell.method.code:
             raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
         scene = hide_truth(load_scene(cell.scene, job.settings.data))
         if scene.digest != cell.scene_digest:
             raise UserError(f"{cell.scene} is not what it was when the run was planned")
         outcome, maps, volume = _solve(method, scene, job)
-        if os.getpid() != process:  # a copy that the method made of its process
+        if os.getpid() != process:  # the method has forked and both returned: only the original goes on
             os._exit(1)
+        # `evolve` makes a scene whose digest is not cached: it is computed from the pixels as they are now
         if evolve(scene).digest != cell.scene_digest:
             raise ValueError("the method wrote into its input")
         os.chdir(place)
         if job.settings.record is not None and not cell.repeat and outcome.status == "ok":
             outcome = _record(method, job, draft / "recording.rrd", outcome)
-    except BaseException as error:  # SystemExit and KeyboardInterrupt, too: no signal comes here
+    except BaseException as error:  # a method may raise SystemExit and KeyboardInterrupt; no Ctrl-C comes here
         if os.getpid() != process:
             os._exit(1)
         traceback.print_exc()
@@ -208,31 +218,34 @@ def run_cell(job: Job, draft: Path) -> Outcome:
 
 
 def _what_failed(error: BaseException) -> tuple[Status, str]:
+    """Status and reason of a cell whose method raised."""
     if isinstance(error, MemoryError):
         return "out-of-memory", f"MemoryError: {error}"
     reason = f"{type(error).__name__}: {first_line(error)}"
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", reason
+    # OpenCV and the system raise other types where memory does not suffice
     is_memory = any(words in str(error).lower() for words in ("insufficient memory", "cannot allocate memory"))
     return "out-of-memory" if is_memory else "failed", reason
 
 
 def serve(line: Connection, printed: int, job: Job) -> None:
-    """Solve the cells that come in, one by one. Never returns.
+    """The child process: solve the cells that come in, one by one. Never returns.
 
-    The answer to each is a line of JSON: "", or why it could not be written, and whether this process is fit
-    for another one.
+    The answer to each is one line of JSON, a pair: "" or why the cell could not be written; and whether this
+    process may solve another cell.
 
     Parameters
     ----------
     printed
-        The file descriptor for all that this process prints, from Python or from C.
+        The file descriptor that receives everything this process prints, from Python or from C.
     job
-        The first of them, by whose settings the process is confined.
+        The first cell's job: its settings give the limits of this process.
     """
+    # the keeper's handlers are inherited and are not for methods
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    os.dup2(printed, 1)
+    os.dup2(printed, 1)  # descriptors 1 and 2, not only sys.stdout: C and Fortran print there
     os.dup2(printed, 2)
     os.close(printed)
     sys.stdout, sys.stderr = (
@@ -252,13 +265,14 @@ def serve(line: Connection, printed: int, job: Job) -> None:
                 said, is_fit = f"{type(error).__name__}: {error}", False
             _flush()
             os.write(line.fileno(), json.dumps([said, is_fit]).encode() + b"\n")
+            # what a method changes in its environment must not reach the next cell of a shared process
             os.environ.clear()
             os.environ.update(environment)
-    os._exit(0)
+    os._exit(0)  # without exit handlers: those that a method registered may hang
 
 
 def _flush() -> None:
-    """Send on what was printed, from C too."""
+    """Write out what is buffered, also by C, so that it is in the log of the cell that printed it."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(Exception):  # the method may have closed or replaced it
             stream.flush()
