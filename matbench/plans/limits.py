@@ -1,4 +1,4 @@
-"""What a cell may take, as people write it: seconds, memory, cells at once, threads."""
+"""Limits of a cell, read as users write them: seconds, memory, threads, and how many cells run at once."""
 
 import os
 import re
@@ -9,17 +9,17 @@ from pathlib import Path
 from matbench.errors import UserError
 
 HOUR = 3600.0
-_MOST = 256  # cells at once, or threads
+_MOST = 256  # of cells that run at once, and of threads
 _UNITS = {"": 1, "m": 1, "g": 1024, "t": 1024 * 1024}
 
 
 def seconds(value: object) -> float | None:
-    """A time limit as given; ``none`` for none.
+    """A time limit in seconds; None for None or ``"none"``: no limit.
 
     Raises
     ------
     UserError
-        If it is no positive number.
+        If it is not a positive number.
     """
     if value is None or value == "none":
         return None
@@ -31,7 +31,7 @@ def seconds(value: object) -> float | None:
 
 
 def mebibytes(value: object) -> int | None:
-    """A memory limit in MiB, from a whole number of them or a text such as ``512M`` or ``1.5G``.
+    """A memory limit in MiB, from a number of MiB or a text such as ``512M`` or ``1.5G``.
 
     >>> mebibytes("1.5G")
     1536
@@ -39,7 +39,7 @@ def mebibytes(value: object) -> int | None:
     Raises
     ------
     UserError
-        If it is something else, or less than 1 MiB.
+        If it is anything else, or less than 1 MiB.
     """
     if value is None:
         return None
@@ -51,7 +51,7 @@ def mebibytes(value: object) -> int | None:
 
 
 def jobs(value: object) -> int:
-    """A number of cells at once.
+    """How many cells run at once.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def jobs(value: object) -> int:
 
 
 def threads(value: object) -> int | None:
-    """A number of threads; None for a share of the cores.
+    """How many threads each method gets; None means an equal share of the cores.
 
     Raises
     ------
@@ -80,12 +80,12 @@ def _counted(name: str, value: object) -> int:
 
 
 def isolation(value: object) -> str:
-    """How processes are shared out to cells.
+    """How cells are separated: ``process``, one process each, or ``shared``, many cells in one process.
 
     Raises
     ------
     UserError
-        If it is neither of the two words.
+        If it is neither of these words.
     """
     if value not in ("process", "shared"):
         raise UserError(f"isolation {value!r} is not process or shared")
@@ -93,12 +93,12 @@ def isolation(value: object) -> str:
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """How many processor cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def room() -> int:
-    """MiB that a run without a limit of its own may take: nine tenths of the machine's, or of its container's."""
+    """Memory in MiB for a run without a limit: nine tenths of the machine's, or of its container's if that has less."""
     import psutil
 
     total = psutil.virtual_memory().total
@@ -108,7 +108,7 @@ def room() -> int:
 
 
 def crowded(at_once: int, threads_each: int) -> str:
-    """What is to be said where cells at once have more threads than there are cores; else nothing."""
+    """A warning if the cells that run at once have more threads than there are cores; else an empty text."""
     if at_once * threads_each <= cores():
         return ""
     return f"{at_once} cells at once with {threads_each} threads each share {cores()} cores: they slow one another down"

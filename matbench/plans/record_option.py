@@ -1,4 +1,4 @@
-"""What a recording holds, as it is chosen: ``--record slices,volumes,passes=10``."""
+"""What a recording is to hold, as the option ``--record slices,volumes,passes=10`` chooses it."""
 
 import re
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ def _rows(rows: Iterable[int]) -> tuple[int, ...]:
 
 @frozen
 class RecordOption:
-    """What is recorded besides views, regions, maps, errors and energies, which always are.
+    """What to record besides views, regions, maps, errors and energies, which are always recorded.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class RecordOption:
     surface
         The answer as points in perspective.
     passes
-        Of how many passes, at most, slices and maps are kept; 0 keeps none.
+        The most passes whose slices and maps are kept; 0 keeps none.
     rows
         The image rows whose epipolar planes are shown; none means the middle one.
     """
@@ -46,7 +46,7 @@ class RecordOption:
 
     @classmethod
     def of(cls, parts: Iterable[str] = (), rows: str | None = None) -> "RecordOption":
-        """Read what was typed; without parts, all of them.
+        """Read what was typed; without any parts, all are chosen.
 
         >>> RecordOption.of(["slices,passes=10"], "144,10").rows
         (10, 144)
@@ -74,7 +74,7 @@ class RecordOption:
         return cls(**chosen, rows=sorted(set(wanted)))  # type: ignore[arg-type]  # names and types are those above
 
     def at(self, height: int) -> "RecordOption":
-        """The same for a scene of so many rows: the middle one if none was named.
+        """The same choice for a scene `height` rows high: the middle row if none was named.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class RecordOption:
         return self if self.rows else evolve(self, rows=(height // 2,))
 
     def covers(self, other: "RecordOption") -> bool:
-        """Does a recording of this hold all that the other asks for?"""
+        """Does a recording made by this choice hold everything that `other` asks for?"""
         has_parts = all(getattr(self, part) or not getattr(other, part) for part in self.PARTS)
         return has_parts and self.passes >= other.passes and set(other.rows) <= set(self.rows)
 

@@ -1,4 +1,4 @@
-"""How a plan is worked through: where scenes lie, what is kept of each cell besides its maps, and what it may take."""
+"""How a plan is run: where the scenes are, what is kept of each cell besides its maps, and the limits of a cell."""
 
 from pathlib import Path
 from typing import Literal
@@ -14,7 +14,7 @@ Only = Literal["missing", "failed", "all"]
 
 @frozen
 class Settings:
-    """What does not decide a cell's answer, and so stands in no key.
+    """Settings that cannot change a cell's answer. So they are not part of its key.
 
     Parameters
     ----------
@@ -23,19 +23,19 @@ class Settings:
     record
         What to record of every cell, from a second, untimed solve; nothing if None.
     volumes
-        Keep the volumes of the methods that have one.
+        Also keep the volumes of methods that have one.
     only
-        Which cells: ``missing`` were never computed, ``failed`` did not end well, ``all`` again; if
-        None, whatever is not done.
+        Which cells to compute: ``missing``, those never computed; ``failed``, those that did not end well;
+        ``all``, every cell again. If None, every cell that is not done.
     timeout
-        Seconds that a cell may take, all told: reading the scene, warm-up, solve, recording. None for no limit.
+        Seconds that a cell may take in all: reading the scene, warm-up, solve, recording. None for no limit.
     memory
         MiB that a cell's processes may hold together, or a text such as ``"4G"``. None for an
         equal share of nine tenths of the machine's.
     jobs
         How many cells run at once.
     threads
-        How many threads each method is given; the cores, shared out to `jobs`, if None.
+        How many threads each method gets; if None, the cores are divided among the `jobs`.
     isolation
         ``"process"``: each cell has a process of its own. ``"shared"``: a process solves one cell
         after the other, until one goes wrong; for trusted methods.

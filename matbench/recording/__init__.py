@@ -1,1 +1,1 @@
-"""What the rerun viewer shows; imports the root's words, `measures` and `plans`."""
+"""Recordings for the rerun viewer. Imports only the root modules, `measures` and `plans`."""

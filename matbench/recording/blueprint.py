@@ -1,4 +1,4 @@
-"""What a recording shows when it opens: panels exist only for what is there."""
+"""The blueprint: which panels the viewer opens with. There are panels only for what the recording holds."""
 
 from collections.abc import Sequence
 
@@ -8,22 +8,22 @@ from attrs import define, field
 
 from matbench.recording.perspective import Eye
 
-EntityPath = tuple[str, ...]  # part by part
+EntityPath = tuple[str, ...]  # its parts, not yet escaped: a label may hold a slash
 Panel = rrb.Container | rrb.View
 
 
 @define
 class SlicePaths:
-    """The slices of one epipolar plane.
+    """Where the slices of one epipolar plane are in a recording.
 
     Parameters
     ----------
     row
         The image row.
     paths
-        Name -> path, in the order in which they are shown.
+        Kind of slice -> entity path, in the order in which they are shown.
     channels
-        Name -> what red, green and blue stand for.
+        Kind of slice -> what red, green and blue stand for.
     """
 
     row: int
@@ -33,7 +33,9 @@ class SlicePaths:
 
 @define
 class Contents:
-    """What a recording holds.
+    """What a recording holds: a table of contents, from which the panels are laid out.
+
+    It is stored in the recording itself, so that two recordings can be shown side by side.
 
     Parameters
     ----------
@@ -42,27 +44,27 @@ class Contents:
     scene
         The scene's digest.
     root
-        What all paths stand under.
+        The path above all others: empty, or the side in a recording of two.
     views, reference
         Paths of all views, and that of the reference view.
     truth
         Is there ground truth, hence an error map?
     estimate
-        Is there a method's answer, or only a scene?
+        Is there a method's answer, or only the scene?
     regions
         Paths of region masks, in the order in which they are shown.
     slices
-        Row by row.
+        One for each row shown.
     volumes
-        Paths of volumes, each with the row to open on: the first of the slices.
+        Paths of volumes, each with the index of the row to open on: the first of those with slices.
     dense
-        Paths of the same volumes in space.
+        Paths of the same volumes as fields in disparity space.
     space
         Path of the voxels in disparity space, if they are drawn.
     told
-        Name -> what the method told, pass by pass: energies.
+        Name -> the numbers that the method told, pass by pass, such as energies.
     error_rates
-        Region -> share of bad pixels of the maps of passes.
+        Region -> per cent of bad pixels in the maps of single passes.
     maps
         Are there disparity maps of single passes?
     surface
@@ -96,12 +98,12 @@ class Contents:
 
     @property
     def method(self) -> str:
-        """What answered, without the scene."""
+        """The method's name: the title without the scene."""
         return self.title.partition(" on ")[0]
 
 
 def layout(contents: Contents) -> rrb.Blueprint:
-    """Left the solids and the curves; right the maps, the slices and all the rest."""
+    """The panels of one recording: on the left 3D panels and curves, on the right maps, slices and the rest."""
     solids, curves = _solids(contents), _curves(contents)
     left: Panel = _picture(contents, contents.reference, "Reference view")
     if solids:
@@ -112,7 +114,7 @@ def layout(contents: Contents) -> rrb.Blueprint:
 
 
 def side_by_side(one: Contents, other: Contents) -> rrb.Blueprint:
-    """Two answers to one scene, panel against panel; what both share, and their curves, below."""
+    """The panels of two answers to one scene, next to each other; below, what both share, and their curves."""
     columns = []
     for contents in (one, other):
         name = f"{contents.method}: "
@@ -148,7 +150,7 @@ def _blueprint(root: Panel, has_time: bool) -> rrb.Blueprint:
 
 
 def _solids(contents: Contents, name: str = "") -> list[Panel]:
-    """The surface, and disparity space."""
+    """The 3D panels: the surface in perspective, and disparity space."""
     panels: list[Panel] = []
     if contents.surface:
         panels.append(_space(contents, [("surface",)], f"{name}Surface in perspective", contents.surface_eye))
@@ -159,7 +161,7 @@ def _solids(contents: Contents, name: str = "") -> list[Panel]:
 
 
 def _curves(contents: Contents, name: str = "") -> list[Panel]:
-    """What was told of several passes: one point is no curve, and stands in the text."""
+    """The curves over passes. A number that was told once makes no curve; it stands in the text."""
     told = [n for n, values in contents.told.items() if len(values) > 1]
     panels: list[Panel] = []
     if "total" in told:
@@ -174,7 +176,7 @@ def _curves(contents: Contents, name: str = "") -> list[Panel]:
 
 
 def _answers(contents: Contents) -> list[Panel]:
-    """The answer and its error, or those of the pass that is looked at."""
+    """The answer and its error; in a second tab, those of the pass chosen on the timeline."""
     kinds = [("disparity", "Disparity")]
     if contents.truth:
         kinds.append(("error", "Error, px of the pair"))
@@ -189,7 +191,7 @@ def _answers(contents: Contents) -> list[Panel]:
 
 
 def _slices(contents: Contents) -> list[Panel]:
-    """One tab for each row: slices are wide, so at most two stand side by side."""
+    """One tab for each row, its slices in at most two columns, as they are wide."""
     tabs: list[Panel] = []
     for here in contents.slices:
         pictures = [_picture(contents, path, what.capitalize()) for what, path in here.paths.items()]
@@ -235,12 +237,12 @@ def _picture(contents: Contents, path: EntityPath, name: str) -> rrb.View:
 
 
 def _overlay(contents: Contents, path: EntityPath, under: EntityPath) -> rrb.View:
-    """A region's mask over the reference view."""
+    """The panel of a region: its mask over the reference view."""
     return rrb.Spatial2DView(origin="/", contents=[contents.at(under), contents.at(path)], name=path[-1])
 
 
 def _space(contents: Contents, shown: Sequence[EntityPath], name: str, eye: Eye | None) -> rrb.View:
-    """A 3D panel of some entities and all below them, y down; with no eye the viewer chooses one."""
+    """A 3D panel of some entities and all below them, y down. Without an eye the viewer chooses one."""
     controls = eye and rrb.EyeControls3D(position=eye[0], look_target=eye[1], eye_up=(0.0, -1.0, 0.0))
     return rrb.Spatial3DView(
         origin=contents.at(shown[0]),
@@ -253,7 +255,7 @@ def _space(contents: Contents, shown: Sequence[EntityPath], name: str, eye: Eye 
 
 
 def _volume(contents: Contents, path: EntityPath, row: int) -> rrb.View:
-    """A slice of a volume with a slider over its rows, the farthest plane at the bottom."""
+    """The panel of a volume: one epipolar plane, the farthest disparity at the bottom, a slider over the rows."""
     selection = rrb.TensorSliceSelection(
         width=rr.TensorDimensionSelection(dimension=2),
         height=rr.TensorDimensionSelection(dimension=1, invert=True),

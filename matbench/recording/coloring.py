@@ -1,7 +1,7 @@
-"""Disparity and error maps as pictures, the same in recordings and on the page.
+"""Disparity and error maps as coloured pictures, the same in recordings and on the report page.
 
-Maps of one scene share one scale of perceptually uniform colours; no answer is striped, unknown
-truth plain grey, which neither colour map holds.
+All maps of a scene share one scale of perceptually uniform colours. Pixels without an answer are striped.
+Pixels of unknown truth are grey; neither colour map contains grey.
 """
 
 from functools import cache
@@ -15,7 +15,7 @@ from matbench.scene import Scene
 DISPARITY, ERROR, DIFFERENCE = "viridis", "magma", "PuOr"
 WORST = 4.0  # px of the pair: errors from here on have the last colour
 UNKNOWN = 128  # grey of unknown truth
-STRIPES = (196, 250)  # two greys: no answer, for every kind of eye
+STRIPES = (196, 250)  # two greys: a pattern, unlike a colour, is told apart by colour-blind readers, too
 
 Picture = NDArray[np.uint8]
 """(H, W, 3) RGB."""
@@ -38,7 +38,7 @@ def stripes(rows: int, columns: int) -> Picture:
 
 
 def colors(values: NDArray[np.floating], ends: tuple[float, float], name: str, levels: int = 256) -> Picture:
-    """(H, W) numbers as colours between two ends; striped where not finite.
+    """(H, W) numbers as colours between two ends; what is not finite is striped.
 
     Fewer `levels` make smaller files; no eye tells 128 from 256.
     """
@@ -51,9 +51,10 @@ def colors(values: NDArray[np.floating], ends: tuple[float, float], name: str, l
 
 
 def disparity_ends(scene: Scene) -> tuple[float, float]:
-    """What the first and the last colour of all disparity maps of a scene stand for.
+    """The disparities of the first and the last colour in all maps of a scene, pixels per view step.
 
-    The ends of the reference view's truth, else of the range to search; never equal.
+    The least and the largest true disparity of the reference view; without truth, the range to search.
+    They are never equal.
     """
     truth = scene.truth.get(scene.ref)
     least, largest = scene.disparities.least, scene.disparities.largest
@@ -63,12 +64,12 @@ def disparity_ends(scene: Scene) -> tuple[float, float]:
 
 
 def disparity_colors(disparity: NDArray[np.floating], ends: tuple[float, float], levels: int = 256) -> Picture:
-    """A method's map: far is dark blue, near is yellow, no answer striped."""
+    """A method's map as a picture: far is dark blue, near is yellow, no answer is striped."""
     return colors(disparity, ends, DISPARITY, levels)
 
 
 def truth_colors(truth: NDArray[np.floating], ends: tuple[float, float], levels: int = 256) -> Picture:
-    """A true map as `disparity_colors`; grey where the truth is not known."""
+    """A true map in the colours of `disparity_colors`; grey where the truth is unknown."""
     picture = colors(truth, ends, DISPARITY, levels)
     picture[~np.isfinite(truth)] = UNKNOWN
     return picture
@@ -77,7 +78,7 @@ def truth_colors(truth: NDArray[np.floating], ends: tuple[float, float], levels:
 def error_colors(
     estimate: NDArray[np.float32], truth: NDArray[np.float32], pair_steps: float, levels: int = 256
 ) -> Picture:
-    """The error from 0 to `WORST` px of the pair; no answer is striped, unknown truth grey."""
+    """The errors as a picture, from 0 to `WORST` px of the pair; no answer is striped, unknown truth is grey."""
     picture = colors(error_map(estimate, truth, pair_steps), (0.0, WORST), ERROR, levels)
     picture[~np.isfinite(truth)] = UNKNOWN
     return picture

@@ -1,4 +1,4 @@
-"""What a recording logs, entity by entity; `matbench.recording.rrd` tells which there are."""
+"""Writing the entities of a recording, one kind after the other. `matbench.recording.rrd` lists them all."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -21,13 +21,14 @@ from matbench.recording.reduction import ReducedVolume
 from matbench.scene import Scene
 from matbench.space import DisparitySpace, Volume, surface
 
+# these bound the size of a recording, whatever the scene
 SEEN_VOLUMES = 8  # views whose visibility is kept
 PICTURE_PIXELS = 750_000  # one map
 VIEWS_PIXELS = 6_000_000  # all views together
-POINTS = 250_000
-VOXELS = 100_000
-DENSE_BYTES = 2**17  # one volume in space, which is marched through
-PLANES = 5  # drawn of a disparity space
+POINTS = 250_000  # of the surface
+VOXELS = 100_000  # boxes in disparity space
+DENSE_BYTES = 2**17  # one volume as a field: the viewer marches rays through it for every frame
+PLANES = 5  # outlines of planes in disparity space: more would hide the answer
 YELLOW, FAINT, THIN = (255, 221, 0), (190, 194, 202), rr.Radius.ui_points(0.75)
 RAY = rr.Radius.ui_points(1.5)
 # Okabe and Ito's colours: apart for every kind of eye
@@ -38,7 +39,17 @@ _converter = make_converter()
 
 @define(eq=False)
 class EntityLogger:
-    """Logs one part after the other and notes what there is for the blueprint."""
+    """Logs the parts of a recording and notes what there is, for the blueprint.
+
+    Parameters
+    ----------
+    probe
+        What the method told.
+    contents
+        What has been logged.
+    rows
+        Entity -> how many rows were logged, for the check of the written file.
+    """
 
     stream: rr.RecordingStream
     scene: Scene
@@ -47,10 +58,11 @@ class EntityLogger:
     rows: Counter[str] = field(factory=Counter)
 
     def log(self, *path: str, what: rr.AsComponents, step: int | None = None) -> EntityPath:
-        """Log for all time, or at a pass."""
+        """Log an entity for all time, or at pass `step`; its path."""
         if step is not None:
             self.stream.set_time("iteration", sequence=step)
         entity = rr.new_entity_path(list(path))
+        # strict: by default rerun prints errors and leaves the data out
         self.stream.log(entity, what, static=step is None, strict=True)
         self.rows[entity] += 1
         return path
@@ -89,7 +101,7 @@ class EntityLogger:
             contents.regions.append(self.log("regions", name, what=inside))
 
     def log_answer(self, estimate: Estimate) -> None:
-        """The map, its error, the surface, and where it lies in disparity space."""
+        """The map, its error, the surface, the volumes, and the answer in disparity space."""
         scene, contents, wanted = self.scene, self.contents, self.probe.wanted
         disparity = np.asarray(estimate.disparity[scene.ref], np.float32)
         contents.estimate = True
@@ -111,7 +123,7 @@ class EntityLogger:
             self.log_space(estimate.volume or self.as_volume(disparity), disparity, estimate.volume is not None)
 
     def log_surface(self, disparity: NDArray[np.float32]) -> None:
-        """A map as points in perspective, planes of some disparities, a point's rays, and where views were taken."""
+        """A map as points in perspective, with planes of some disparities, the rays of one point, and the cameras."""
         scene, contents = self.scene, self.contents
         perspective = Perspective.of(scene)
         points, colors, radii = perspective.surface(disparity, POINTS)
@@ -133,11 +145,11 @@ class EntityLogger:
         contents.surface, contents.surface_eye = True, perspective.eye(points)
 
     def log_lines(self, *path: str, strips: list[list[Point]], names: Sequence[str], colored: bool = False) -> None:
-        """Thin lines, named where they begin: planes in grey, or what belongs to views in the views' colours."""
+        """Lines, with a name where they begin: grey for planes; if `colored`, each in the colour of its view."""
         colors = [VIEW_COLORS[i % len(VIEW_COLORS)] if colored else FAINT for i in range(len(strips))]
         radii = RAY if colored else THIN
         self.log(*path, what=rr.LineStrips3D(strips, colors=colors, radii=radii))
-        # of planes the first and the last: more names would hide what they name
+        # only the first and the last plane are named: more names would hide the planes
         named = range(len(strips)) if colored else sorted({0, len(strips) - 1})
         starts = rr.Points3D(
             [strips[i][0] for i in named],
@@ -149,7 +161,7 @@ class EntityLogger:
         self.log(*path, "names", what=starts)
 
     def pixel(self, disparity: NDArray[np.float32]) -> tuple[int, int] | None:
-        """The answered pixel of the first row shown that is nearest to its middle."""
+        """The pixel whose rays are drawn: of the first row shown, the one with an answer nearest to the middle."""
         row = self.shown[0]
         known = np.flatnonzero(np.isfinite(disparity[row]))
         if not len(known):
@@ -157,13 +169,13 @@ class EntityLogger:
         return row, int(known[np.argmin(np.abs(known - self.scene.width // 2))])
 
     def as_volume(self, disparity: NDArray[np.float32]) -> Volume:
-        """A map of the reference view as target points, for methods that have no volume."""
+        """A map of the reference view as a volume, for methods that have none."""
         scene = self.scene
         space = DisparitySpace.covering(scene.disparities, scene.n, scene.height, scene.width)
         return surface(space, {scene.ref: disparity}, tuple(range(scene.n)))
 
     def log_space(self, volume: Volume, disparity: NDArray[np.float32], is_material: bool) -> None:
-        """Target points in disparity space, some of its planes, and the rays that meet in one of them."""
+        """The answer in disparity space: voxels, the views' frustums, some planes, and rays that meet in one point."""
         scene, contents, space = self.scene, self.contents, volume.space
         row = min(self.shown[0], space.rows - 1)
         step = volume.views[1] - volume.views[0]  # the space's disparities are per step of its own views
@@ -189,7 +201,7 @@ class EntityLogger:
         contents.space_eye = space_diagram.eye_on(space)
 
     def log_passes(self, estimate: Estimate) -> None:
-        """What every pass came to, and slices, maps and errors of those that were kept."""
+        """The numbers of every pass, and slices, maps and errors of the passes that were kept."""
         contents, frames = self.contents, self.probe.frames
         told = dict(self.probe.energies)
         for name, values in estimate.history.items():
@@ -207,12 +219,12 @@ class EntityLogger:
                 self._log_slices(number, row, frames, estimate.volume)
 
     def _log_pass_map(self, frame: PassCapture, disparity: NDArray[np.float32]) -> None:
-        """The map of a pass, its error, and the share of bad pixels in the field's regions."""
+        """The map of one pass, its error, and the per cent of bad pixels in three regions."""
         scene, step = self.scene, frame.step
         self.log_picture("passes", "disparity", picture=coloring.disparity_colors(disparity, self.ends), step=step)
         if scene.ref not in scene.truth:
             return
-        thin = ceil(scene.height / len(disparity))
+        thin = ceil(scene.height / len(disparity))  # the probe has thinned the map; the truth must match
         truth = scene.truth[scene.ref][::thin, ::thin]
         self.log_picture(
             "passes", "error", picture=coloring.error_colors(disparity, truth, scene.pair_steps), step=step
@@ -226,7 +238,7 @@ class EntityLogger:
                     self.contents.error_rates.setdefault(region, []).append(value)
 
     def _log_slices(self, number: int, row: int, frames: list[PassCapture], volume: Volume | None) -> None:
-        """One epipolar plane: what the method told of it, pass by pass, and what its answer comes to."""
+        """The slices of one epipolar plane: similarity, visibility, and those of the kept passes."""
         here = SlicePaths(row)
 
         def add(name: str, picture: NDArray[np.uint8], step: int | None = None, channels: tuple[str, ...] = ()) -> None:
@@ -254,7 +266,7 @@ class EntityLogger:
             self.contents.slices.append(here)
 
     def log_volumes(self, volume: Volume) -> None:
-        """Materiality, and how far views see."""
+        """The volume of materiality, and the visibility that follows from it in some views."""
         row = min(self.shown[0], volume.space.rows - 1)
         self.log_volume("materiality", volume=reduction.reduce_volume(volume, row))
         seen = np.unique(np.linspace(0, volume.space.views - 1, SEEN_VOLUMES).round().astype(int))
@@ -263,7 +275,7 @@ class EntityLogger:
             self.log_volume("visibility", label, volume=reduction.reduce_volume(volume, row, index))
 
     def log_volume(self, *name: str, volume: ReducedVolume) -> None:
-        """A volume as bytes with a slider over its epipolar planes, and, coarser, in space."""
+        """A volume twice: as a tensor with a slider over its rows, and, coarser, as a field in space."""
         tensor = rr.Tensor(volume.values, dim_names=("row", "plane", "column"), value_range=(0, 255))
         path = self.log("volumes", *name, what=tensor)
         row = min(self.shown[0], volume.space.rows - 1)
@@ -281,7 +293,7 @@ class EntityLogger:
         self.contents.dense.append(self.log("haze", *name, what=what))
 
     def log_guide(self, title: str) -> None:
-        """How to read it all, and for the viewer what there is."""
+        """The text that explains the recording; last, as it depends on what there is."""
         self.contents.title, self.contents.scene = title, self.scene.digest
         self.log(
             "about", what=rr.TextDocument(guide(self.scene, self.shown, self.contents), media_type="text/markdown")
@@ -293,13 +305,13 @@ def _disparities(values: list[float]) -> list[str]:
 
 
 def contents_text(contents: Contents) -> str:
-    """What a recording notes of itself, as JSON."""
+    """The table of contents as JSON, to store in the recording."""
     text: str = _converter.dumps(contents)
     return text
 
 
 def read_contents(text: str) -> Contents:
-    """What `contents_text` wrote.
+    """Read what `contents_text` wrote.
 
     Raises
     ------

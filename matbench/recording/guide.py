@@ -1,4 +1,4 @@
-"""How to read a recording, in words."""
+"""The text panel of a recording: what its panels and colours mean."""
 
 from matbench.measures.metrics import METRICS
 from matbench.recording import coloring
@@ -7,11 +7,11 @@ from matbench.recording.perspective import Perspective
 from matbench.scene import Scene
 
 MATERIAL = 0.25  # least materiality of a drawn voxel
-ERROR_METRIC = next(metric for metric in METRICS if metric.name == "total_bad_1")  # of passes
+ERROR_METRIC = next(metric for metric in METRICS if metric.name == "total_bad_1")  # of the maps of single passes
 
 
 def guide(scene: Scene, rows: tuple[int, ...], contents: Contents) -> str:
-    """What stands where, as markdown.
+    """The text, as Markdown.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ make the pair in whose pixels errors are given.
 
 
 def _channels(contents: Contents) -> str:
-    """What the colours of slices stand for."""
+    """What red, green and blue mean in the slices of similarity and visibility."""
     said = ""
     for name in ("similarity", "visibility"):
         channels = next((s.channels[name] for s in contents.slices if name in s.channels), [])
@@ -56,7 +56,7 @@ def _channels(contents: Contents) -> str:
 
 
 def _numbers(contents: Contents) -> str:
-    """What was told once and so makes no curve, and the error after the last pass."""
+    """Numbers that make no curve as the method told them once, and the error after the last pass."""
     lines = [f"- **{name}**, told once: {values[0]:.4g}" for name, values in contents.told.items() if len(values) == 1]
     if contents.error_rates:
         rates = ", ".join(f"{values[-1]:.2f} % in {region}" for region, values in contents.error_rates.items())

@@ -1,6 +1,6 @@
-"""A scene's surface in perspective: points, planes of constant disparity, and pixel rays.
+"""The geometry of a scene's surface in perspective: points, planes of constant disparity, and pixel rays.
 
-Nothing here knows the viewer.
+Nothing here depends on the viewer.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from matbench.recording.coloring import disparity_ends
 from matbench.recording.reduction import step_within
 from matbench.scene import Scene
 
-DEEPEST = 6.0  # farthest depth over nearest depth of a drawn range of disparities
+DEEPEST = 6.0  # largest ratio of farthest to nearest depth: with more, near things would crowd together
 
 Point = tuple[float, float, float]
 Eye = tuple[Point, Point]  # position and target
@@ -21,12 +21,13 @@ Eye = tuple[Point, Point]  # position and target
 class Perspective:
     """Where disparities lie in space, up to scale; x right, y down, z away from the camera.
 
-    Depth is focal length times baseline over disparity, ``z = (nearest + offset) / (d + offset)``,
-    with the nearest disparity that the scene shows at depth 1. Neither focal length nor baseline is
-    known: the one is drawn as the image's width, the other follows from the unit. The offset is 0
-    wherever what the scene shows allows it: true perspective. Where disparities come near 0 or below,
-    whose depth is infinite or undefined, the offset is the least that leaves the farthest depth at
-    `DEEPEST`; it bends no plane, for adding to a disparity is a projective map.
+    Depth is focal length times baseline over disparity. Here it is ``z = (nearest + offset) / (d + offset)``:
+    the nearest disparity shown has depth 1. Focal length and baseline are unknown. The focal length is drawn
+    as the image's width, and the baseline follows from the depths.
+
+    With offset 0 this is true perspective. A disparity near 0 or below has infinite or no depth. Then the
+    offset is the least that makes the farthest depth `DEEPEST`. Planes stay planes, as adding a constant to
+    every disparity is a projective map.
 
     Parameters
     ----------
@@ -55,11 +56,11 @@ class Perspective:
         return (self.ends[1] + self.offset) / self.scene.width
 
     def depth(self, disparity: float) -> float:
-        """Where a disparity lies; what is farther than twice the farthest end stays in sight there."""
+        """The depth of a disparity, at most twice that of the farthest end: outliers stay in sight."""
         return float(self.depths(np.array(disparity, np.float64)))
 
     def depths(self, disparity: NDArray[np.floating]) -> NDArray[np.float64]:
-        """`depth` of many."""
+        """The depths of many disparities, as `depth`."""
         near, far = self.ends[1] + self.offset, self.ends[0] + self.offset
         depths: NDArray[np.float64] = near / np.maximum(disparity.astype(np.float64) + self.offset, far / 2)
         return depths
@@ -67,10 +68,9 @@ class Perspective:
     def surface(
         self, disparity: NDArray[np.float32], limit: int
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.float32]]:
-        """Points (N, 3), colours (N, 3) and radii (N,) of a reference view's map, one per finite pixel.
+        """Points (N, 3), colours (N, 3) and radii (N,) of a reference view's map, one for each finite pixel.
 
-        With more than `limit` pixels, every k-th row and column; a radius closes the gap to the
-        neighbouring pixel.
+        Of more than `limit` pixels, every k-th row and column. A point is as large as the gap to its neighbours.
         """
         scene, picture = self.scene, self.scene.views[self.scene.ref]
         step = step_within(disparity.shape[0], disparity.shape[1], limit)
@@ -88,7 +88,7 @@ class Perspective:
         return [(-x, -y, z), (x, -y, z), (x, y, z), (-x, y, z), (-x, -y, z)]
 
     def ray(self, view: int, pixel: tuple[int, int], disparity: float) -> list[Point]:
-        """From a view's centre through the point of a reference pixel (row, column), on to the farthest plane."""
+        """The ray from a view's centre through the point of a reference pixel (row, column), to the farthest plane."""
         scene = self.scene
         z, last = self.depth(disparity), self.depth(self.ends[0])
         y, x = (
@@ -99,7 +99,7 @@ class Perspective:
         return [(centre, 0.0, 0.0), (x, y, z), (centre + (x - centre) * reach, y * reach, z * reach)]
 
     def eye(self, points: NDArray[np.float32]) -> Eye | None:
-        """Where to look from: the reference view, a little from the right and above."""
+        """Where to look from: behind the reference view, a little from the right and above; None without points."""
         if not len(points):
             return None
         # from behind the reference view, so that the cameras are in sight; a step aside shows depth

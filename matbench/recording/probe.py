@@ -1,4 +1,4 @@
-"""The probe that listens: a bounded part of what a method tells, kept for a recording or a figure."""
+"""The probe of recordings and figures: it keeps a bounded part of what a method tells while it works."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,13 +12,23 @@ from matbench.recording import reduction
 from matbench.recording.reduction import ReducedVolume
 from matbench.space import Volume, visibility
 
-TOLD_VOLUMES = 12  # volumes that a method tells; later names are left out
+TOLD_VOLUMES = 12  # volumes kept by name; further names are dropped, as a method may tell one for every pair
 PASS_PIXELS = 200_000  # the map of a pass
 
 
 @frozen(eq=False)
 class PassCapture:
-    """What is kept of one pass: slices of materiality, of the derivative's sign, and the map."""
+    """What is kept of one pass.
+
+    Parameters
+    ----------
+    materiality
+        (rows, planes, columns) uint8: slices of the wanted rows.
+    derivative
+        (rows, planes, columns) int8: the sign of dE/dmu in the same slices.
+    disparity
+        The reference view's map, thinned.
+    """
 
     step: int
     materiality: NDArray[np.uint8] | None
@@ -28,12 +38,12 @@ class PassCapture:
 
 @frozen(eq=False)
 class ColoredSlices:
-    """Up to three slices as red, green and blue.
+    """Up to three kinds of slice in one picture, as red, green and blue.
 
     Parameters
     ----------
     picture
-        (rows, planes, columns, 3) uint8; channels that stand for nothing are 0.
+        (rows, planes, columns, 3) uint8; unused channels are 0.
     names
         What red, green and blue stand for.
     """
@@ -44,18 +54,24 @@ class ColoredSlices:
 
 @define(eq=False)
 class CapturingProbe(Probe):
-    """Keeps a bounded part of what a method tells, copied: methods may reuse their arrays.
+    """Keeps a bounded part of what a method tells. It copies arrays, as methods may reuse them.
 
-    Energies are kept of every pass. Slices and maps are kept of at most so many passes as are
-    wanted, spread evenly, the first and the last among them: whenever there are too many, every
-    other one goes.
+    Energies are kept of every pass. Slices and maps are kept of at most ``wanted.passes`` passes, spread
+    evenly, the first and the last among them. Nobody knows beforehand how many passes there will be: so
+    whenever there are too many, every second one is dropped, and from then on half as many are kept.
 
     Parameters
     ----------
     wanted
-        What is listened to, with its rows.
+        What to keep, with the rows of the slices.
+    volumes
+        Name -> volume, reduced.
+    similarities
+        Name -> (rows, planes, columns) uint8, slices of a pair's similarity.
     latest
-        The slices of the similarity told last.
+        The slices of the similarity that was told last.
+    energies
+        Name -> (pass, value), in order.
     """
 
     wanted: RecordOption
@@ -105,35 +121,35 @@ class CapturingProbe(Probe):
 
     @property
     def frames(self) -> list[PassCapture]:
-        """At most so many passes as are wanted, the first and the last one told among them."""
+        """The kept passes, at most as many as wanted, with the first and the last that was told."""
         if self._last is None or self._last is self._frames[-1]:
             return list(self._frames)
         return [*self._frames[: self.wanted.passes - 1], self._last]
 
     def slices_of(self, volume: Volume) -> Volume:
-        """The epipolar planes that are shown, as a volume of so many rows."""
+        """The wanted rows of a volume, as a volume that has only these."""
         rows = [min(row, volume.space.rows - 1) for row in self.wanted.rows]
         return Volume(evolve(volume.space, rows=len(rows)), volume.values[rows], volume.views)
 
     def similarity(self, labels: Sequence[str]) -> ColoredSlices | None:
-        """Three pairs as red, green and blue, called by their views' labels.
+        """The similarities of three pairs as red, green and blue; None if the method told none.
 
-        Pairs of neighbouring views, if there are three: of more the first, the middle and the last.
-        Else the three whose views are least apart.
+        Of neighbouring views, if there are at least three such pairs: the first, the middle and the last. Else
+        the three pairs whose views are least apart.
         """
         if not self.similarities:
             return None
         names = sorted(self.similarities, key=_apart)
         shape = self.similarities[names[0]].shape
-        alike = [name for name in names if self.similarities[name].shape == shape]
-        near = [name for name in alike if _apart(name) == _apart(names[0])]
-        pool = near if len(near) >= 3 else alike[:3]
+        comparable = [name for name in names if self.similarities[name].shape == shape]
+        near = [name for name in comparable if _apart(name) == _apart(names[0])]
+        pool = near if len(near) >= 3 else comparable[:3]
         in_order = [name for name in self.similarities if name in pool]
         chosen = [in_order[i] for i in sorted({0, len(pool) // 2, len(pool) - 1})]
         return _colored([self.similarities[name] for name in chosen], [pair_label(name, labels) for name in chosen])
 
     def visibility(self, volume: Volume, labels: Sequence[str]) -> ColoredSlices:
-        """How far the leftmost, the middle and the rightmost view of a volume see, as red, green and blue."""
+        """The visibility in the leftmost, the middle and the rightmost view of a volume, as red, green and blue."""
         here, last = self.slices_of(volume), len(volume.views) - 1
         chosen = sorted({0, (last + 1) // 2, last})
         seen = [reduction.as_bytes(visibility(here, view)) for view in chosen]
@@ -148,13 +164,13 @@ def _colored(channels: Sequence[NDArray[np.uint8]], names: Sequence[str]) -> Col
 
 
 def pair_of(name: str) -> tuple[int, int] | None:
-    """The views of a pair: (2, 3) for ``similarity/2-3``; None if the name does not say."""
+    """The views of a pair: (2, 3) for ``similarity/2-3``; None for other names."""
     first, _, second = name.removeprefix("similarity/").partition("-")
     return (int(first), int(second)) if first.isdecimal() and second.isdecimal() else None
 
 
 def pair_label(name: str, labels: Sequence[str]) -> str:
-    """``similarity/2-3`` by the labels of its views, ``im2-im3``; else what stands after ``similarity/``."""
+    """A pair by its views' labels: ``im2-im3`` for ``similarity/2-3``; other names as they are."""
     pair = pair_of(name)
     if pair is None or max(pair) >= len(labels):
         return name.removeprefix("similarity/")
@@ -162,5 +178,6 @@ def pair_label(name: str, labels: Sequence[str]) -> str:
 
 
 def _apart(name: str) -> int:
+    """How many view steps the views of a pair are apart; 0 for other names."""
     pair = pair_of(name)
     return abs(pair[1] - pair[0]) if pair else 0

@@ -1,6 +1,6 @@
-"""Volumes and maps as bounded arrays of bytes: what recordings and figures show.
+"""Volumes and maps reduced to a bounded number of bytes, for recordings and figures.
 
-Nothing here knows the viewer.
+Nothing here depends on the viewer.
 """
 
 from math import ceil
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from matbench.space import DisparitySpace, Volume, visibility
 
 VOLUME_BYTES = 3 * 2**19  # one recorded volume: 1.5 MiB
-SLICE_PIXELS = 150_000
+SLICE_PIXELS = 150_000  # one slice
 
 
 def step_within(height: int, width: int, pixels: int) -> int:
-    """The least k such that every k-th row and column are at most `pixels`."""
+    """The least k such that every k-th row and column together have at most `pixels` pixels."""
     step = 1
     while ceil(height / step) * ceil(width / step) > pixels:
         step += 1
@@ -24,7 +24,7 @@ def step_within(height: int, width: int, pixels: int) -> int:
 
 
 def thinned(values: NDArray[np.float32], pixels: int) -> NDArray[np.float32]:
-    """Every k-th row and column of a map, at most `pixels`."""
+    """Every k-th row and column of a map, at most `pixels` in all. Blending would invent disparities at edges."""
     step = step_within(values.shape[0], values.shape[1], pixels)
     return values[::step, ::step]
 
@@ -36,7 +36,7 @@ def as_bytes(values: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def upright(planes: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """An epipolar slice as a picture: the farthest plane at the bottom, planes thick enough to see.
+    """An epipolar slice as a picture: the farthest plane at the bottom, planes repeated until they can be seen.
 
     Disparity grows upward, as in the paper's figure 2; columns are those of view 0, outside its
     frame included.
@@ -48,8 +48,8 @@ def upright(planes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
     Returns
     -------
-    (planes * k, columns[, 3]), where k makes the picture about three times as wide as high. If it
-    were larger than `SLICE_PIXELS`, only every m-th column is kept.
+    (planes * k, columns[, 3]), where k makes the picture about three times as wide as high. If that is
+    larger than `SLICE_PIXELS`, only every m-th column is kept.
     """
     height, width = planes.shape[:2]
     kept = planes[::-1, :: ceil(height * width / SLICE_PIXELS)]
@@ -67,17 +67,17 @@ def sign_colors(derivative: NDArray[np.integer]) -> NDArray[np.uint8]:
 
 @frozen(eq=False)
 class ReducedVolume:
-    """A volume small enough to be kept: every k-th row and column, thick planes, as bytes.
+    """A volume made small enough to store: every k-th row and column, planes joined, as bytes.
 
     Parameters
     ----------
     space
-        The target points that it was taken from.
+        The disparity space of the whole volume.
     values
-        (rows, planes, columns) uint8. Values are exact at the kept rows and columns, not blended;
-        planes, if they had to be joined, keep their largest value.
+        (rows, planes, columns) uint8. Values at the kept rows and columns are exact, not blended.
+        Planes that were joined keep their largest value: else a thin surface would vanish.
     first_row
-        The first kept row; the row shown in slices is always among the kept ones.
+        The first kept row. The row that slices show is always kept.
     steps
         How many rows, planes and columns of the space one element stands for.
     """
@@ -91,22 +91,22 @@ class ReducedVolume:
 def steps_within(space: DisparitySpace, limit: int) -> tuple[int, int, int]:
     """Steps along (rows, planes, columns) with which a volume has at most `limit` elements.
 
-    Rows and columns are thinned evenly in pixels; planes, which carry the result, four times later.
+    Rows and columns get equal steps in pixels. Planes carry the result: their step grows four times later.
     """
     steps = [1, 1, 1]
     finest = (1.0, 4.0 / space.fineness, 1.0 / space.fineness)
     while np.prod([ceil(size / step) for size, step in zip(space.shape, steps, strict=True)]) > limit:
-        # an axis down to one element has nothing left to give
+        # an axis with one element left cannot shrink further
         left = [axis for axis in range(3) if steps[axis] < space.shape[axis]]
         steps[min(left, key=lambda axis: steps[axis] * finest[axis])] += 1
     return steps[0], steps[1], steps[2]
 
 
 def reduce_volume(volume: Volume, row: int, view: int | None = None, limit: int = VOLUME_BYTES) -> ReducedVolume:
-    """A volume, or with `view` the visibility that follows from it there, as at most `limit` bytes.
+    """A volume in at most `limit` bytes; with `view`, the visibility in that view instead.
 
-    Row `row` is among the kept ones. Rows go first: epipolar planes stand alone, so that the
-    visibilities of those that are kept are exact.
+    Row `row` is kept. Rows are dropped before visibility is computed, columns and planes after it: epipolar
+    planes do not depend on each other, so the visibility in the kept rows is exact.
     """
     space, steps = volume.space, steps_within(volume.space, limit)
     first = row % steps[0]
@@ -120,7 +120,7 @@ def reduce_volume(volume: Volume, row: int, view: int | None = None, limit: int 
 
 
 def coarser(volume: ReducedVolume, row: int, limit: int) -> ReducedVolume:
-    """The same with every k-th row and column of it, at most `limit` bytes; row `row` is among them."""
+    """A reduced volume reduced further, to at most `limit` bytes: every k-th row and column; row `row` is kept."""
     rows, planes, columns = volume.values.shape
     step = 1
     while ceil(rows / step) * planes * ceil(columns / step) > limit and step < max(rows, columns):

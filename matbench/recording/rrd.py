@@ -1,9 +1,9 @@
-"""Recordings: all that a solve told, its scene and its answer, as one file for the rerun viewer.
+"""Recordings: a scene, a method's answer and what it told while it worked, in one file for the rerun viewer.
 
 ============================  ===========================================================
 entity                        what it holds
 ============================  ===========================================================
-about                         how to read the recording
+about                         what the panels and colours mean
 views/LABEL                   a view; in the reference view lines mark the rows of the slices
 truth/disparity               true disparity: dark blue is far, yellow near, grey unknown
 estimate/disparity            the method's answer in the same colours, striped where it has none
@@ -29,10 +29,10 @@ space/planes, .../rays        some of its planes; the rays of all views that mee
 space/frustums                what each view sees of the epipolar plane of the first row
 ============================  ===========================================================
 
-Everything is bounded, whatever the scene: see the constants in `matbench.recording.entities` and
-`matbench.recording.reduction`. Tensors keep their values as uint8 and have a slider through the epipolar
-planes; rerun's ray-marched `Volume3D` takes float16 only. Pictures are coloured here and not by
-the viewer, which paints NaN like the largest disparity.
+The size of a file is bounded, whatever the scene: see the constants in `matbench.recording.entities` and
+`matbench.recording.reduction`. Volumes are tensors of uint8 with a slider over the rows; they are stored a
+second time as fields, coarser, as rerun's `Volume3D` takes only float16. Maps are coloured here and not by the
+viewer, which would draw NaN in the colour of the largest disparity.
 """
 
 import re
@@ -54,7 +54,7 @@ from matbench.recording.probe import CapturingProbe
 from matbench.scene import Scene
 
 NOTE = "matbench"
-"""The property under which a recording notes what it holds."""
+"""The property that holds a recording's table of contents."""
 
 
 class RecordingError(Exception):
@@ -69,23 +69,23 @@ def record(
     title: str,
     wanted: RecordOption = RecordOption(),  # noqa: B008 -- frozen
 ) -> Estimate:
-    """Solve once more, listening, and write what was told to `path`.
+    """Run a method with a probe that keeps what it tells, and write the recording.
 
-    The file is written beside its place, read back whole and then moved there: under its own name
-    it is complete or it is not there.
+    The file is written under another name, read back, and then moved to `path`. So a file of that name is
+    always complete.
 
     Parameters
     ----------
     path
-        Where the recording goes; a file of that name is replaced.
+        The file; if it exists, it is replaced.
     scene
-        With its ground truth and regions, which the method need not see.
+        The scene with ground truth and regions, which the method need not get.
     solve
-        Runs the method with the probe that it is given.
+        Runs the method with the probe that this function hands it.
     title
         What the viewer calls the recording.
     wanted
-        What is recorded, and the image rows whose epipolar planes are shown.
+        What to record, and the image rows whose epipolar planes are shown.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def record(
     RecordingError
         If what was written cannot be read back. Whatever `solve` raises is not caught.
     ValueError
-        If the scene has not the rows.
+        If the scene has fewer rows than those wanted.
     """
     probe = CapturingProbe(wanted.at(scene.height))
     estimate = solve(probe)
@@ -119,11 +119,12 @@ def record_scene(path: Path, scene: Scene) -> None:
 
 @contextmanager
 def staged(path: Path) -> Iterator[Path]:
-    """A place beside `path` to write to, moved there when the block ends, gone if it fails.
+    """A file to write to, moved to `path` when the block ends; removed if the block fails.
 
-    Errors in what is logged meanwhile are raised; by default rerun prints them and leaves the data out.
+    In the block rerun raises its errors. By default it prints them and leaves the data out.
     """
     before = rr.strict_mode()
+    # in the same folder: only within one file system is moving a file a single step
     with TemporaryDirectory(dir=path.parent, prefix=".recording-") as folder:
         beside = Path(folder) / path.name
         rr.set_strict_mode(True)
@@ -135,8 +136,12 @@ def staged(path: Path) -> Iterator[Path]:
 
 
 def new_stream(path: Path, title: str) -> rr.RecordingStream:
-    """A stream into a new file, whose rows carry the pass and nothing else."""
-    # an identity of its own, for the viewer keeps one blueprint for each; it takes no other characters
+    """A stream into a new file. Its rows carry the number of the pass, and no time of day.
+
+    Without times, the same solve gives the same rows.
+    """
+    # the viewer remembers one blueprint for each application id: recordings that show other things need another one.
+    # It accepts no other characters.
     stream = rr.RecordingStream("matbench-" + re.sub(r"[^A-Za-z0-9]+", "-", title)[:80].strip("-"))
     stream.save(path)
     stream.set_log_tick_enabled(False)
@@ -146,7 +151,7 @@ def new_stream(path: Path, title: str) -> rr.RecordingStream:
 
 
 def _write(path: Path, scene: Scene, probe: CapturingProbe, estimate: Estimate | None, title: str) -> Counter[str]:
-    """Write all there is; how many rows were logged for each entity."""
+    """Write scene, answer and passes into a file; entity -> how many rows were logged."""
     stream = new_stream(path, title)
     try:
         logger = EntityLogger(stream, scene, probe)
@@ -165,12 +170,17 @@ def _write(path: Path, scene: Scene, probe: CapturingProbe, estimate: Estimate |
 
 
 def verify(path: Path, written: Counter[str]) -> None:
-    """Read a recording back: what the command ``rerun rrd verify`` does, and that nothing is missing.
+    """Read a recording back, as ``rerun rrd verify`` does, and check that no row is missing.
+
+    Parameters
+    ----------
+    written
+        Entity -> how many rows were logged.
 
     Raises
     ------
     RecordingError
-        If it is not whole.
+        If it cannot be read, or rows are missing.
     """
     try:
         with warnings.catch_warnings():
@@ -183,5 +193,5 @@ def verify(path: Path, written: Counter[str]) -> None:
     except (RuntimeError, ValueError, Warning) as error:
         raise RecordingError(f"the recording cannot be read back: {error}") from error
     missing = written - found
-    if stores != (1, 1) or missing:
+    if stores != (1, 1) or missing:  # one recording and one blueprint
         raise RecordingError(f"the recording is not whole: {stores} stores, missing {dict(missing)}")

@@ -1,4 +1,4 @@
-"""Two recordings of one scene in one file, panel against panel."""
+"""Two recordings of one scene merged into one file, for panels side by side."""
 
 from collections import Counter
 from pathlib import Path
@@ -16,12 +16,12 @@ SIDES = ("A", "B")
 
 
 def merge(path: Path, one: Path, other: Path) -> None:
-    """Write one recording of two, each under its side's name.
+    """Merge two recordings into one file, each below a path of its own, ``A`` or ``B``.
 
     Raises
     ------
     UserError
-        If one of them cannot be read, or they are of different scenes.
+        If one cannot be read, or their scenes differ.
     RecordingError
         If what was written cannot be read back.
     """
@@ -32,7 +32,7 @@ def merge(path: Path, one: Path, other: Path) -> None:
         )
     for contents, name in zip(sides, SIDES, strict=True):
         contents.root = (name,)
-    if sides[0].method == sides[1].method:  # two runs or seeds of one method: say which is which
+    if sides[0].method == sides[1].method:  # two runs or seeds of one method: titles must differ
         sides = [evolve(c, title=f"{name} {c.title}") for c, name in zip(sides, SIDES, strict=True)]
     written: Counter[str] = Counter()
     with staged(path) as beside:
@@ -42,7 +42,7 @@ def merge(path: Path, one: Path, other: Path) -> None:
                 chunks = [
                     chunk.with_entity_path(contents.at(()) + chunk.entity_path)
                     for chunk in rr.chunk.RrdReader(source).stream()
-                    if not chunk.entity_path.startswith("/__")
+                    if not chunk.entity_path.startswith("/__")  # properties of the whole file, such as its contents
                 ]
                 for chunk in chunks:
                     written[chunk.entity_path] += chunk.num_rows
@@ -54,12 +54,12 @@ def merge(path: Path, one: Path, other: Path) -> None:
 
 
 def contents_of(path: Path) -> Contents:
-    """What a recording notes of itself.
+    """The table of contents of a recording.
 
     Raises
     ------
     UserError
-        If it cannot be read, or was not written by `matbench.recording.rrd`.
+        If the file cannot be read, or has none: `matbench.recording.rrd` did not write it.
     """
     try:
         for chunk in rr.chunk.RrdReader(path).stream().filter(content=f"/__properties/{NOTE}"):

@@ -1,7 +1,7 @@
-"""Disparity space drawn as a box: columns of view 0 to the right, rows down, far planes behind near ones.
+"""The geometry of disparity space drawn as a box: columns of view 0 to the right, rows down, far planes behind.
 
-Pixel rays are straight lines in it, and those of one epipolar plane cross in the target points:
-that is what disparity space is. Nothing here knows the viewer.
+Pixel rays are straight lines in it, and the rays of one epipolar plane cross in the target points. Nothing
+here depends on the viewer.
 """
 
 import numpy as np
@@ -14,28 +14,28 @@ from matbench.recording.reduction import ReducedVolume
 from matbench.space import DisparitySpace
 
 GAMMA = 2.0
-"""Small values of a dense volume are this power of themselves: else their haze would hide the large ones."""
+"""Values of a dense volume are raised to this power: else the haze of many small values would hide the large ones."""
 
 THROUGH_ALL = 3.0  # optical depth across a dense volume, on average
 
 
 def _depth(space: DisparitySpace, plane: float) -> float:
-    """Where a plane's far side is drawn in disparity space: the whole is half as deep as the image is wide."""
+    """Depth at which a plane's far side is drawn; the whole box is half as deep as the image is wide."""
     return (space.planes - plane) / space.planes * space.width / 2
 
 
 @frozen(eq=False)
 class Voxels:
-    """Elements of a volume where they are in disparity space.
+    """Elements of a volume as boxes in disparity space.
 
     Parameters
     ----------
     indices
         (N, 3), along columns, rows and planes; the nearest plane is 0, towards the eye.
     colors
-        (N, 3): the plane's colour, as in a disparity map.
+        (N, 3) uint8: the colour of the plane's disparity, as in a map.
     size, origin
-        Of an element, and the corner of the first: columns of view 0 and rows in pixels.
+        Size of an element, and the corner of the first one: columns of view 0 and rows in pixels.
     """
 
     indices: NDArray[np.int32]
@@ -45,9 +45,9 @@ class Voxels:
 
 
 def voxels(volume: ReducedVolume, least: float, limit: int, ends: tuple[float, float]) -> Voxels:
-    """The elements of at least `least`; with more than `limit`, those of the largest values.
+    """The elements whose value is at least `least`; if more than `limit`, those with the largest values.
 
-    `ends` are those of the colours of disparities.
+    `ends` are the disparities of the first and the last colour (`coloring.disparity_ends`).
     """
     y, k, x = np.nonzero(volume.values >= max(1, round(255 * least)))
     if len(y) > limit:
@@ -62,7 +62,7 @@ def voxels(volume: ReducedVolume, least: float, limit: int, ends: tuple[float, f
 
 
 def frustum(space: DisparitySpace, view: int, row: int) -> list[Point]:
-    """The closed outline of what a view sees of an epipolar plane, drawn as `voxels` are."""
+    """The closed outline of what a view sees of an epipolar plane, in the coordinates of `Voxels`."""
     outline = []
     for plane, end in ((0, 0), (0, 1), (space.planes - 1, 1), (space.planes - 1, 0), (0, 0)):
         column = (space.start(view, plane) + space.origin) / space.fineness + end * space.width
@@ -78,7 +78,7 @@ def plane(space: DisparitySpace, number: int) -> list[Point]:
 
 
 def ray(space: DisparitySpace, view: int, row: int, sample: int) -> list[Point]:
-    """The ray of one sample of a view, from the nearest plane to the farthest: every point on it is a target point."""
+    """The ray of one sample of a view, from the nearest plane to the farthest."""
     ends = []
     for number in (space.planes - 1, 0):
         column = (space.start(view, number) + space.origin + sample + 0.5) / space.fineness
@@ -87,9 +87,9 @@ def ray(space: DisparitySpace, view: int, row: int, sample: int) -> list[Point]:
 
 
 def target(space: DisparitySpace, view: int, sample: int, number: int) -> tuple[int, tuple[int, ...]]:
-    """The column of a target point, and the sample of every view whose ray meets it there (equation 1).
+    """The target point on a view's sample and a plane: its column, and the sample of every view that meets it.
 
-    The point is given by the plane and the sample of one view.
+    Source: equation 1 of the paper.
     """
     column = space.start(view, number) + sample
     return column, tuple(column - space.start(other, number) for other in range(space.views))
@@ -97,17 +97,17 @@ def target(space: DisparitySpace, view: int, sample: int, number: int) -> tuple[
 
 @frozen(eq=False)
 class Dense:
-    """A volume as the viewer marches through it.
+    """A volume as a field, which the viewer draws by marching rays through it.
 
     Parameters
     ----------
     values
         (planes, rows, columns) float16 in [0, 1], the nearest plane first.
     size, origin
-        Of an element, and the corner of the first, as in `Voxels`.
+        Size of an element, and the corner of the first one, as in `Voxels`.
     depth
-        Optical depth of a whole axis of ones. Surfaces are a plane or two thick and would hardly be seen, fields
-        that are full hide all: whatever the values, a volume is as dense on average.
+        Optical depth across an axis full of ones. It is chosen so that every volume is equally dense on average:
+        else a surface, one or two planes thick, would hardly be seen, and a full volume would hide everything.
     """
 
     values: NDArray[np.float16]
@@ -117,7 +117,7 @@ class Dense:
 
 
 def dense(volume: ReducedVolume) -> Dense:
-    """All elements of a volume where they are in disparity space."""
+    """All elements of a volume, as a field in disparity space."""
     values = volume.values.transpose(1, 0, 2)[::-1].astype(np.float16) / np.float16(255)
     filled = float(np.mean(values.astype(np.float32) ** GAMMA))
     return Dense(values, *_grid(volume), THROUGH_ALL / max(filled, 0.5 / len(values)))
@@ -131,7 +131,7 @@ def _grid(volume: ReducedVolume) -> tuple[Point, Point]:
 
 
 def eye_on(space: DisparitySpace) -> Eye:
-    """Where to look from to see all of a space."""
+    """The eye that sees all of a space."""
     left, right = space.origin / space.fineness, (space.origin + space.columns) / space.fineness
     # seen whole in a panel twice as wide as high
     distance = max(space.rows, (right - left) / 2) + 0.15 * space.width

@@ -1,4 +1,4 @@
-"""Opening a recording, in the native viewer or in a browser."""
+"""Opening a recording in the rerun viewer, in a window or in a browser."""
 
 import os
 import socket
@@ -14,12 +14,12 @@ from matbench.errors import UserError
 
 
 def view(path: Path, web: bool = False) -> None:
-    """Show a recording until the viewer is closed or Ctrl-C is typed.
+    """Show a recording, until the viewer is closed or Ctrl-C is typed.
 
     Parameters
     ----------
     path
-        A recording.
+        The recording.
     web
         Serve it to a browser on this machine, and print the address, instead of opening a window.
 
@@ -35,7 +35,7 @@ def view(path: Path, web: bool = False) -> None:
     ports = _free_port(), _free_port()
     command = [str(_executable()), str(path), "--port", str(ports[0])]
     if web:
-        # not on all interfaces, which is its default
+        # this machine only: by default it listens on all interfaces, and anybody could open the recording
         command += ["--web-viewer", "--bind", "127.0.0.1", "--web-viewer-port", str(ports[1])]
     quiet = {"RUST_LOG": "error", **os.environ}
     with subprocess.Popen(command, env=quiet) as viewer:  # noqa: S603
@@ -53,7 +53,10 @@ def view(path: Path, web: bool = False) -> None:
 
 
 def _executable() -> Path:
-    """The viewer inside the rerun-sdk package, run directly so that it can be ended."""
+    """The viewer's program inside the rerun-sdk package.
+
+    The command `rerun` is a Python script that starts this program: ending the script would leave the viewer open.
+    """
     package = find_spec("rerun_cli")
     folders = [Path(folder) for folder in (package and package.submodule_search_locations) or ()]
     name = "rerun.exe" if sys.platform == "win32" else "rerun"
@@ -65,13 +68,14 @@ def _executable() -> Path:
 
 
 def _free_port() -> int:
+    """A port that is free now: with a fixed one, only one viewer could be open at a time."""
     with closing(socket.socket()) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 def _answers(port: int, viewer: subprocess.Popen[bytes], seconds: float = 20.0) -> bool:
-    """Wait until the web viewer can be reached; False if it ended or took too long."""
+    """Wait until the web viewer can be reached; False if it has ended, or took longer than `seconds`."""
     end = time.monotonic() + seconds
     while time.monotonic() < end and viewer.poll() is None:
         with closing(socket.socket()) as probe:
