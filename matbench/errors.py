@@ -1,4 +1,4 @@
-"""The one kind of error that is the user's to mend."""
+"""Errors that a user can put right."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -12,12 +12,14 @@ class UserError(Exception):
 
 
 def unknown(kind: str, value: str, possible: Iterable[str]) -> UserError:
-    """The error for a name that does not exist: `kind` and `value`, the nearest name, all names.
+    """The error for a name that does not exist. Its message has the nearest name and all possible names.
 
     Parameters
     ----------
     kind
-        What the name should be: a noun and, if need be, of what, such as ``option of synthetic/box``.
+        What the name should be: a noun, or a noun and what it belongs to, such as ``option of synthetic/box``.
+    value
+        The name as it was typed.
 
     >>> str(unknown("algorithm", "sgmb", ["sgbm", "okutomi_kanade"]))
     "unknown algorithm 'sgmb': did you mean 'sgbm'? Possible: okutomi_kanade, sgbm"

@@ -1,9 +1,9 @@
-"""Regions of the reference view, from images and ground truth alone.
+"""Regions of the reference view, computed from images and ground truth alone.
 
-Those of the field's pair follow Scharstein & Szeliski 2002 and the masks of the Middlebury evaluation that came of it.
-What the paper leaves open was settled by the occluded part of those masks (intersection over
-union 0.993, 0.920 and 0.953 on Tsukuba, Venus and Teddy) and of their discontinuities (0.998,
-0.962, 0.943), by one rule for all scenes.
+The regions of the field's pair follow Scharstein & Szeliski 2002 and the masks of their Middlebury evaluation.
+What the paper leaves open was chosen by comparison with these masks, with one rule for all scenes. Intersection
+over union on Tsukuba, Venus and Teddy is 0.993, 0.920 and 0.953 for occlusions and 0.998, 0.962 and 0.943 for
+discontinuities.
 """
 
 from collections.abc import Mapping
@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, uniform_filter
 
 OCCLUSION_TOLERANCE = 1.0
-"""Px of the pair. What lies no more than this in front does not hide: a slanted surface, sampled
-in pixels, falls twice on the same column, and whole-number truth makes steps of one pixel of it."""
+"""Px of the pair. A point hides another only if it is nearer by more than this. On a slanted surface two pixels may
+fall on the same column of the other view, and whole-number truth turns slants into steps of one pixel."""
 
 JUMP, JUMP_WIDTH = 2.0, 9
-"""Px of the pair from which two neighbours make a depth jump; width of the window around it."""
+"""Px of the pair: neighbours that differ by this much make a depth jump; px: width of the window around it."""
 
 TEXTURE, TEXTURE_WIDTH = 4.0, 3
-"""Grey levels of horizontal gradient below which there is no texture; width of the window."""
+"""Grey levels: below this horizontal gradient there is no texture; px: width of the window."""
 
 _ROUNDING = 1e-4  # px: as for the scores, float32 rounding does not decide a tie
 
@@ -80,11 +80,11 @@ def regions(
 
 
 def points_seen(truth: NDArray[np.float32], steps: float) -> Mask:
-    """Which points a view `steps` to the right sees (to the left if negative), the frame included.
+    """Which points of the reference view are seen by a view `steps` to the right (to the left if negative).
 
-    Every pixel is carried to the nearest column of that view; where several meet, all are seen
-    that lie no more than `OCCLUSION_TOLERANCE` behind the nearest. It needs no truth in the other
-    view: where both have it (Venus, Teddy), checking one against the other, alone or on top,
+    Every pixel is carried to the nearest column of that view; outside its frame it is not seen. Of the pixels
+    that meet in one column, those no more than `OCCLUSION_TOLERANCE` behind the nearest are seen. Truth of the
+    other view is not needed. Where there is one (Venus, Teddy), comparing both truths, alone or in addition,
     agreed less with the published masks.
 
     Parameters
@@ -113,22 +113,21 @@ def points_seen(truth: NDArray[np.float32], steps: float) -> Mask:
 def view_regions(truth: NDArray[np.float32], ref: int, count: int, seen: Mask | None = None) -> Mapping[str, Mask]:
     """How many of the used views see a pixel's point, and why the others do not.
 
-    Every pixel of known truth is in exactly one of the four. The paper's semi-occlusion (its
-    frustum test alone fails somewhere) is ``out_of_frame``; what its product over nearer points
-    must find out is ``half_occluded``; in ``seen_once`` nothing can be matched. With two views
-    ``seen_in_all`` and ``seen_once`` are all there is.
+    Every pixel of known truth is in exactly one of the four regions. ``out_of_frame`` is the paper's
+    semi-occlusion, which its frustum test finds alone. ``half_occluded`` is what its product over nearer
+    points must find. In ``seen_once`` nothing can be matched. With two views only ``seen_in_all`` and
+    ``seen_once`` exist.
 
     Parameters
     ----------
     truth
         (H, W) float32, pixels per view step, NaN where unknown.
     ref, count
-        Which of how many views that is.
+        Index of the reference view, and the number of views.
     seen
-        (count, H, W) bool, whether each view sees the point, where that is known exactly; by
-        default `points_seen` decides, with its tolerance of a pixel between the two views: a strip
-        that is narrower than that is not found, and what has no known truth hides nothing. A
-        point inside the frame's columns that a view does not see counts as hidden.
+        (count, H, W) bool, whether each view sees the point, where that is known exactly. By default
+        `points_seen` decides. It misses occluded strips narrower than its tolerance, and points of unknown
+        truth hide nothing. A point inside a view's frame that the view does not see counts as hidden.
 
     Returns
     -------
@@ -152,17 +151,17 @@ def view_regions(truth: NDArray[np.float32], ref: int, count: int, seen: Mask | 
 
 
 def near_jumps(disparity: NDArray[np.float32], occluded: Mask) -> Mask:
-    """What lies in a window around a depth jump or an occlusion.
+    """Pixels within a window around a depth jump or an occlusion.
 
-    A jump is between two neighbours in a row or a column, or across a hole in the truth; both of
-    its sides and the hole between them belong to it.
+    A jump is between two neighbours in a row or a column, or across a hole in the truth. Both its sides and
+    the hole belong to it.
 
     Parameters
     ----------
     disparity
         (H, W) float32, pixels of the pair, NaN where unknown.
     occluded
-        (H, W) bool. It is behind a jump, wherever that left its trace.
+        (H, W) bool. Occluded pixels lie behind a jump, even where the truth shows none.
     """
     core = occluded | _jumps_along_rows(disparity) | _jumps_along_rows(disparity.T).T
     near: Mask = maximum_filter(core, JUMP_WIDTH, mode="constant", cval=False)
@@ -182,7 +181,7 @@ def _jumps_along_rows(disparity: NDArray[np.float32]) -> Mask:
 
 
 def textureless(image: NDArray[np.uint8]) -> Mask:
-    """Where the squared horizontal gradient, averaged over a window, is below the threshold squared.
+    """Pixels whose squared horizontal gradient, averaged over a window, is below the threshold squared.
 
     The gradient is a difference of neighbours in grey levels, squared, averaged over the
     channels; a pixel takes the larger of its two. (The paper does not say whether the threshold

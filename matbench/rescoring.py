@@ -1,4 +1,4 @@
-"""Runs that lie on disk, taken up to be scored again: no method runs, no plug-in file is read."""
+"""Scoring runs on disk again, and joining runs. No method runs, and no plug-in file is read."""
 
 import shutil
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from matbench.scenes.catalogue import data_root, load_scene
 
 @frozen(eq=False)
 class Scenes:
-    """The scenes of a plan, as far as they are here and unchanged.
+    """The scenes of a plan that are on this machine and unchanged, and why others are not.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Scenes:
 def open_run(
     folder: Path, data: str | Path | None = None, partial: bool = False
 ) -> tuple[Comparison, Mapping[str, str]]:
-    """A run as `matbench.comparison.prepare` gave it, from what is on disk; and the scenes that are left out, and why.
+    """A run on disk as a comparison, as `matbench.comparison.prepare` made it; and left-out scenes -> why.
 
     Parameters
     ----------
@@ -84,8 +84,8 @@ def join(folders: Sequence[Path], out: Path) -> Store:
     Raises
     ------
     UserError
-        If they do not belong into one table: a scene of one name has other pixels, a method of one
-        name other code, or the same cell other maps.
+        If they do not belong in one table: a scene of the same name has other pixels, a method of the same
+        name has other code, or the same cell has other maps.
     """
     stores = [Store(folder) for folder in folders]
     for store in stores:

@@ -20,7 +20,7 @@ class SceneError(UserError):
 
 
 class NotInScene(SceneError):
-    """A number of views, or a baseline, that a scene does not have: patterns leave such scenes out."""
+    """A number of views, or a baseline, that a scene does not have. A pattern then leaves the scene out."""
 
 
 @frozen
@@ -64,7 +64,7 @@ def _frozen_arrays(arrays: Mapping[Any, NDArray[Any]]) -> Mapping[Any, NDArray[A
 
 @frozen(eq=False)
 class HeldOut:
-    """A view that methods are not given, to be predicted.
+    """A view that methods do not get: it is to be predicted from their answer.
 
     Parameters
     ----------
@@ -103,8 +103,8 @@ class Scene:
     truth
         View index -> (H, W) float32, pixels per view step, NaN where unknown.
     pair_steps
-        How many view steps lie between the two views in whose pixels the field gives its
-        thresholds; errors are multiplied by it before they meet a threshold.
+        How many view steps lie between the two views of the field's pair. The field gives thresholds in
+        pixels of that pair, so errors are multiplied by this number before they are compared with one.
     regions
         Name -> (H, W) bool mask of the reference view. They come from the full scene and do not
         change when views are chosen; `scored_regions` adds those that do.

@@ -1,1 +1,1 @@
-"""What people look at: the report page, its tables and figures."""
+"""What people look at: the report page, tables and figures for papers, contact sheets, tables in a terminal."""

@@ -24,7 +24,7 @@ from matbench.scene import Scene
 from matbench.scenes.photo_consistency import left_over
 
 WIDTH = 1800  # px
-SHOWN = 15  # at most so many views and truth maps; of more, evenly chosen ones
+SHOWN = 15  # views and truth maps at most; of more, an even choice
 
 _MARGIN, _GAP, _CAPTION, _HEADING = 44, 14, 26, 62
 _BACKGROUND, _INK, _SOFT = (24, 26, 30), "#f2f2ee", "#a9adb5"
@@ -37,7 +37,7 @@ _REGION_COLORS = ((0, 158, 115), (86, 180, 233), (230, 159, 0), (213, 94, 0), (2
 
 @frozen(eq=False)
 class Tile:
-    """A picture, what stands below it, and whether it is framed."""
+    """A picture with its caption; the reference view's is framed."""
 
     picture: Picture
     caption: str
@@ -46,7 +46,7 @@ class Tile:
 
 @define(eq=False)
 class _Sheet:
-    """Pictures and texts, placed from the top down; drawn when all is there."""
+    """Collects pictures and texts from the top down. They are drawn at the end, when the height is known."""
 
     pictures: list[tuple[int, int, Picture]] = field(factory=list)
     texts: list[tuple[int, int, str, dict[str, Any]]] = field(factory=list)
@@ -63,7 +63,7 @@ class _Sheet:
         self.y += 16
 
     def tiles(self, tiles: Sequence[Tile], columns: int, exact: bool) -> None:
-        """Rows of tiles, all of one size."""
+        """Place tiles in rows, all of one size. `exact` keeps hard pixels when they are enlarged, as for maps."""
         width = (WIDTH - 2 * _MARGIN - (columns - 1) * _GAP) // columns
         height, broad = tiles[0].picture.shape[:2]
         width = min(width, 2 * broad)
@@ -97,7 +97,7 @@ class _Sheet:
 
 
 def contact_sheet(scene: Scene, row: int | None = None) -> bytes:
-    """Draw a scene.
+    """Draw the contact sheet of a scene.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def _truth_caption(scene: Scene, view: int) -> str:
 
 
 def _left_over(scene: Scene, view: int) -> Tile:
-    """Where the truth does not explain the other views: noise, mirrors, its own errors."""
+    """The difference that remains when views are warped by the truth: noise, mirrors, errors of the truth."""
     difference = left_over(evolve(scene, ref=view, regions={}))
     picture = colors(difference, (0, _WORST), ERROR)
     picture[~np.isfinite(difference)] = UNKNOWN
@@ -181,7 +181,7 @@ def _left_over(scene: Scene, view: int) -> Tile:
 
 
 def _spread(views: Iterable[int], ref: int) -> list[int]:
-    """At most `SHOWN` of them, evenly chosen, the reference view among them if it is one."""
+    """At most `SHOWN` of the views, evenly chosen; the reference view stays if it is one of them."""
     every = list(views)
     if len(every) <= SHOWN:
         return every
@@ -209,7 +209,7 @@ def _framed(picture: Picture, thick: int = 3) -> Picture:
 
 
 def _marked(scene: Scene, view: int, row: int) -> Picture:
-    """A view; in the reference view, the row that is shown below is marked at both sides."""
+    """A view; in the reference view, both ends of the row that is shown below are marked."""
     marked: Picture = scene.views[view].copy()
     if view != scene.ref:
         return marked
@@ -220,7 +220,7 @@ def _marked(scene: Scene, view: int, row: int) -> Picture:
 
 
 def _strips(sheet: _Sheet, scene: Scene, row: int) -> None:
-    """The row of every view, one below the other, as thick strips."""
+    """One row of pixels of every view, as thick strips below each other."""
     width = WIDTH - 2 * _MARGIN
     shown = _spread(range(scene.n), scene.ref)
     strips = np.repeat(scene.views[shown, row], min(40, 200 // len(shown)), axis=0)
@@ -241,7 +241,7 @@ def _color_bar(sheet: _Sheet, least: float, largest: float) -> None:
 
 
 def _region(scene: Scene, mask: NDArray[np.bool_], color: tuple[int, int, int]) -> Picture:
-    """The reference view in grey and dark; in a colour what belongs to the region."""
+    """The reference view in dark grey, with the region in colour."""
     grey = scene.views[scene.ref].astype(np.float32).mean(axis=2, keepdims=True)
     inside = (1 - _TINT) * grey + _TINT * np.array(color, np.float32)
     picture: Picture = np.rint(np.where(mask[..., None], inside, _DIM * grey)).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""What a report is made of: everything that the page shows, as one frozen value."""
+"""Everything that the report page shows, as one frozen value."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -13,7 +13,7 @@ from matbench.scene import Scene
 from matbench.spec import Value
 
 Key = tuple[str, str, str, int]
-"""Algorithm, parameters, scene and seed: the names of a cell."""
+"""Algorithm, parameters, scene and seed: they name a cell."""
 
 Maps = Mapping[Key, NDArray[np.float32] | None] | Callable[[str, str, str, int], NDArray[np.float32] | None]
 
@@ -27,14 +27,14 @@ def _no_volume(*_: object) -> None:
 
 @frozen(eq=False)
 class Report:
-    """A finished run, ready to be looked at.
+    """A finished run, with everything that its page shows.
 
     Parameters
     ----------
     title
         What the run is called.
     command
-        The line that made it.
+        The command line that made it.
     results
         Tidy scores: algorithm, params, scene, view, seed, region, metric, value, unit, pixels.
     cells
@@ -46,11 +46,11 @@ class Report:
     scenes
         Name -> scene. A scene that is not among them has no pictures.
     facts
-        What it ran on, as shown: ``{"numpy": "2.4.1", "processor": ...}``.
+        What the run ran on, as it is shown: ``{"numpy": "2.4.1", "processor": ...}``.
     ablation
         What each factor does (`matbench.results.ablation.COLUMNS`), if that was asked for.
     sweeps
-        What took several numbers, as curves.
+        The curves of options that took several numbers.
     reliability
         Reliability curves of the volumes that were kept (`matbench.results.scores.reliabilities`).
     higher
@@ -58,11 +58,11 @@ class Report:
     volumes
         Cell -> the volume that was kept, or None; read one at a time.
     histories
-        Cell -> what it told of every pass, such as energies; None for a number that is not finite.
+        Cell -> name -> one number for each pass, such as energies; None for a number that is not finite.
     parameters
         Method, as `cells` names it by algorithm and params -> every parameter with its value.
     rows
-        The image rows of the epipolar slices, where some were asked for.
+        The image rows of the epipolar slices; empty if none were asked for.
     """
 
     title: str

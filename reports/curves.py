@@ -1,4 +1,4 @@
-"""Curves of a run's sweeps, in a terminal and on the page: error against whatever took several numbers."""
+"""The curves of sweeps, in a terminal and on the page: error against an option that took several numbers."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -35,14 +35,14 @@ IN_TERMINAL = ("nonocc", "all", "occ")
 
 
 def title(sweep: Sweep) -> str:
-    """What is swept and how far, and the setting of the scenes' other options."""
+    """The title of a sweep: what is varied, its values, and the scenes' other options."""
     what = f"{sweep.option} of {sweep.of}" if sweep.of else WORDS.get(sweep.option, sweep.option)
     what += f", {sweep.values[0]:g} to {sweep.values[-1]:g}"
     return f"{what}, scenes with {sweep.setting}" if sweep.setting else what
 
 
 def caption(sweep: Sweep, metric: str = METRIC) -> str:
-    """What the means are over, and what to beware of."""
+    """What the means are taken over, and warnings."""
     count = len(sweep.scenes)
     said = [f"Mean {metric} over the {_scenes(count)} with every value: {', '.join(sweep.scenes)}."]
     if not count:
@@ -73,10 +73,10 @@ def _of(sweep: Sweep, metric: str) -> pd.DataFrame:
 
 
 def lines(sweep: Sweep, metric: str = METRIC) -> pd.DataFrame:
-    """One row for each region and method: what is shown, as texts.
+    """The table of a sweep as texts: one row for each region and method.
 
-    Columns: region, method, the values, then `change` from the first value to the last, its
-    interval and verdict.
+    Columns: region, method, the mean at each value; then the `change` from the first value to the last, its
+    interval and its verdict.
     """
     rows, out = _of(sweep, metric), []
     for region in regions(rows):
@@ -94,7 +94,7 @@ def lines(sweep: Sweep, metric: str = METRIC) -> pd.DataFrame:
 
 
 def terminal(sweeps: Sequence[Sweep], metric: str = METRIC) -> list[Table]:
-    """A table for each sweep: its means in the regions of most interest."""
+    """A table for each sweep: the means in the regions of most interest."""
     out = []
     for sweep in sweeps:
         rows = lines(sweep, metric)
@@ -115,7 +115,7 @@ def terminal(sweeps: Sequence[Sweep], metric: str = METRIC) -> list[Table]:
 
 
 def figure(sweep: Sweep, metric: str = METRIC) -> "Figure | None":
-    """A panel for each region with a curve for each method; None where nothing is known."""
+    """A panel for each region, with a curve for each method; None if there are no numbers."""
     rows = _of(sweep, metric)
     names = regions(rows)
     if not names:

@@ -1,4 +1,4 @@
-"""Disparity maps as small pictures from which a browser reads the numbers back."""
+"""Disparity maps as small pictures, from which the page's script reads the numbers back."""
 
 from base64 import b64encode
 
@@ -11,10 +11,10 @@ from matbench.recording.coloring import WORST
 from matbench.scene import Scene
 
 FINER = 8
-"""Steps of a coarse level."""
+"""Fine steps within one coarse level."""
 
 LEAST_SIDE = 64
-"""Pictures are not made smaller than this, px, however many there are."""
+"""Px: no picture is made smaller, however many there are."""
 
 _COARSE = 255  # levels of the upper half; 0 is none
 
@@ -24,20 +24,20 @@ _QUICK = (cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE)
 
 @frozen
 class Coding:
-    """How the disparities of one scene stand in a grey picture's bytes.
+    """How the disparities of one scene are stored in the bytes of a grey picture.
 
-    The picture is twice as high as the map: the upper half holds coarse levels, at least one pixel of
-    the pair each, and is what is seen where nothing colours it; the lower half holds 0..`FINER` - 1
-    finer steps. Black above is no number.
+    The picture is twice as high as the map. The upper half holds coarse levels of at least one pixel of the
+    pair each; it also looks like a disparity map where no script colours it. The lower half holds fine steps,
+    0..`FINER` - 1. Black in the upper half means no number.
 
     Parameters
     ----------
     low
-        The least disparity that can be told, pixels of the pair.
+        The least disparity that can be stored, pixels of the pair.
     unit
-        A coarse level, pixels of the pair.
+        The size of a coarse level, pixels of the pair.
     gain
-        A byte of the upper half is this times the coarse level, counted from 1.
+        A byte of the upper half is this number times the coarse level, counted from 1.
     """
 
     low: float
@@ -46,7 +46,7 @@ class Coding:
 
     @classmethod
     def of(cls, scene: Scene) -> "Coding":
-        """Room for the scene's range and truth, and on either side for errors up to the last colour."""
+        """A coding with room for the scene's range and truth, and on both sides for errors up to the last colour."""
         ends = [scene.disparities.least, scene.disparities.largest]
         truth = scene.truth.get(scene.ref)
         if truth is not None and np.isfinite(truth).any():
@@ -58,13 +58,13 @@ class Coding:
 
     @property
     def step(self) -> float:
-        """The least difference that can be told, pixels of the pair."""
+        """The least difference that can be stored, pixels of the pair."""
         return self.unit / FINER
 
     def encode(self, disparity: NDArray[np.float32], pair_steps: float, side: int) -> str:
         """(H, W) disparities, pixels per view step -> a PNG as ``data:`` address.
 
-        Values beyond the ends are moved there; a picture longer than `side` is thinned, not blended.
+        Values beyond the ends are moved to the ends. A picture longer than `side` is thinned, not blended.
         """
         values = thinned_to_side(disparity, side).astype(np.float64) * pair_steps
         known = np.isfinite(values)
@@ -77,7 +77,7 @@ class Coding:
 
 
 def side_for(pictures: int) -> int:
-    """The longer side of a picture, px, with so many of them: what keeps the page of any run small."""
+    """The longer side of a picture, px, if there are so many: it bounds the size of the page."""
     return int(np.clip(6100 / max(1, pictures) ** 0.5, 160, 1024))
 
 
@@ -88,7 +88,7 @@ def size_within(height: int, width: int, side: int) -> tuple[int, int]:
 
 
 def thinned_to_side(values: NDArray[np.float32], side: int) -> NDArray[np.float32]:
-    """A map with the longer side at most `side`: some of its pixels, as they are."""
+    """A map whose longer side is at most `side`: some of its pixels, not blended."""
     rows, columns = size_within(values.shape[0], values.shape[1], side)
     if (rows, columns) == values.shape:
         return values
@@ -96,7 +96,7 @@ def thinned_to_side(values: NDArray[np.float32], side: int) -> NDArray[np.float3
 
 
 def photograph(picture: NDArray[np.uint8], side: int) -> str:
-    """(H, W, 3) RGB -> a WebP as ``data:`` address, blended to `side`."""
+    """(H, W, 3) RGB -> a WebP as ``data:`` address, shrunk to `side` with blending."""
     rows, columns = size_within(picture.shape[0], picture.shape[1], side)
     smaller = picture
     if (rows, columns) != picture.shape[:2]:

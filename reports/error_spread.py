@@ -1,4 +1,4 @@
-"""How errors are spread: over thresholds, and over how many of the views see a pixel."""
+"""How errors are distributed: over thresholds, and over the number of views that see a pixel."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 THRESHOLDS = np.arange(0, 8.01, 0.25)
 """Px of the pair."""
 
-WRONG = 1.0  # px of the pair: errors by the number of views are those of total_bad_1
-LEAST_PIXELS = 50  # fewer make no share
+WRONG = 1.0  # px of the pair: as in total_bad_1
+LEAST_PIXELS = 50  # a share of fewer pixels is mostly chance
 
 Counts = NDArray[np.intp]
 
 
 def views_seeing(scene: Scene) -> Counts | None:
-    """(H, W) how many views see the reference view's points, itself counted; 0 where truth is unknown.
+    """(H, W) how many views see each point of the reference view, itself included; 0 where truth is unknown.
 
-    As for the regions over all views: exact where the scene knows it, else from the truth.
+    Exact where the scene knows it, else from the truth, as for the regions over all views.
     """
     truth = scene.truth.get(scene.ref)
     if truth is None:
@@ -42,14 +42,14 @@ def views_seeing(scene: Scene) -> Counts | None:
 
 @frozen(eq=False)
 class Spread:
-    """Where the errors of one map on one scene are.
+    """The errors of one map on one scene, by threshold and by number of views.
 
     Parameters
     ----------
     above
-        Region -> (thresholds,) per cent of its pixels not answered, or with an error above each.
+        Region -> (thresholds,) per cent of its pixels without an answer or with an error above each threshold.
     by_views
-        Number of views that see a pixel -> per cent of those pixels not answered or more than `WRONG` off.
+        Number of views that see a pixel -> per cent of these pixels without an answer or with an error above `WRONG`.
     views
         How many views the scene has.
     """
@@ -60,12 +60,12 @@ class Spread:
 
 
 def spread(estimate: NDArray[np.float32], scene: Scene, seeing: Counts) -> Spread:
-    """Measure one map of the reference view.
+    """Measure one map of the reference view, (H, W) in pixels per view step.
 
     Parameters
     ----------
     seeing
-        Of `views_seeing`.
+        The result of `views_seeing`.
     """
     truth = scene.truth[scene.ref]
     error = np.nan_to_num(error_map(estimate, truth, scene.pair_steps), nan=np.inf)
@@ -85,7 +85,7 @@ Spreads = Mapping[tuple[str, str], Spread]
 
 
 def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
-    """A panel for each region: share of pixels with an error above each threshold, a curve for each ranked method."""
+    """A panel for each region: per cent of pixels with errors above each threshold, a curve for each ranked method."""
     measured = {region for part in spreads.values() for region in part.above}
     found = [region for region in REGIONS if region in measured]
     methods = [m for m in scope.methods if scope.is_ranked(m)]
@@ -102,7 +102,7 @@ def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
 
 
 def by_views(spreads: Spreads, scope: Shared) -> "tuple[Figure | None, list[str]]":
-    """A panel for each number of views: total_bad_1 against how many of them see a pixel; and what to beware of."""
+    """total_bad_1 against how many views see a pixel, a panel for each number of views in a scene; and warnings."""
     methods = [m for m in scope.methods if scope.is_ranked(m)]
     shared = {s: part for (_, s), part in spreads.items() if s in scope.scenes}
     panels, said = [], []

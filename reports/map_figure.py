@@ -1,4 +1,4 @@
-"""The paper's figure 3: scenes, their true disparities, and the maps of methods."""
+"""A figure like the paper's figure 3: scenes, their true disparities, and the maps of methods."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,9 +15,9 @@ from matbench.scene import Scene
 from matbench.spec import read_scene
 
 ABREAST: dict[Width, int] = {"column": 4, "page": 8}
-"""Scenes in one line."""
+"""The most scenes side by side."""
 LEAST = 0.45
-"""Inches, of a picture's width: what can still be seen."""
+"""Inches: the least width of a picture in which something can be seen."""
 
 
 @frozen(eq=False)
@@ -27,9 +27,9 @@ class Maps:
     Parameters
     ----------
     scenes
-        Column by column.
+        One for each column.
     methods
-        Row by row, after the reference view and the truth.
+        One for each row, after the reference view and the truth.
     disparity
         (method, scene's name) -> (H, W) map in pixels per view step; missing where there is none.
     """
@@ -40,12 +40,12 @@ class Maps:
 
 
 def draw(maps: Maps, width: Width = "column", errors: bool = False) -> CaptionedFigure:
-    """Reference views, truths and maps, one scene a column; with `errors` also the errors of each map.
+    """Draw reference views, truths and maps, one scene in each column; with `errors`, also the errors of each map.
 
     Raises
     ------
     UserError
-        If a page cannot hold it.
+        If it does not fit on a page.
     """
     from matplotlib.figure import Figure
 
@@ -94,7 +94,7 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Captioned
 
 
 def _rows(maps: Maps, errors: bool) -> list[tuple[str, str, str]]:
-    """(kind, method, what it is) of every row."""
+    """Every row as (kind, method, what the caption says)."""
     rows = [("view", "", "reference views")]
     if any(scene.ref in scene.truth for scene in maps.scenes):
         rows.append(("truth", "", "true disparities, grey unknown"))
@@ -125,7 +125,7 @@ def _draw(axis: Any, maps: Maps, scene: Scene, kind: str, method: str) -> None:
 
 
 def _titles(scenes: Sequence[Scene]) -> dict[str, str]:
-    """Scenes without dataset and options, where they can still be told apart; the caption has all of it."""
+    """Short titles: without dataset and options if they still differ. The caption has the whole names."""
     whole = {scene.name: scene.name for scene in scenes}
     tails = {name: name.partition("/")[2] or name for name in whole}
     bare = {name: read_scene(name).name.partition("/")[2] or name for name in whole}

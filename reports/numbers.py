@@ -1,4 +1,4 @@
-"""All numbers that the page lets one choose: the same tables as everywhere, for every metric and region."""
+"""All numbers that a reader of the page can choose: the usual tables, for every metric and region."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from matbench.reports.standing import Difference
 from matbench.reports.tables import METRIC, REGION, Shared
 
 THRESHOLD = re.compile(r"(bad|total_bad)_(\d+(?:\.\d+)?)")
-"""Metrics that are one number at several thresholds."""
+"""Metrics that have a threshold in their name."""
 
 AT = "@"  # stands for the threshold in a family's name
 
@@ -26,17 +26,17 @@ COSTS = {"seconds": ("s", "time"), "peak_mb": ("MiB", "memory")}
 """Column of the cells -> unit, and what it is called."""
 
 Entry = list[Any]
-"""[number or None, as shown, place]: what a cell of a table needs, in the template and in the script."""
+"""[number or None, as shown, place]: one cell of a table, for the template and for the script."""
 
 
 @frozen(eq=False)
 class Numbers:
-    """Every table of a run, from which template and script take theirs.
+    """Every table of a run; the page's template and script take theirs from here.
 
     Parameters
     ----------
     scope
-        Its methods in the order in which they are shown.
+        The methods, in the order in which they are shown, and their scenes.
     """
 
     report: Report
@@ -52,7 +52,7 @@ class Numbers:
 
     @property
     def metric(self) -> str:
-        """What is shown first."""
+        """The metric that is shown first."""
         return METRIC if METRIC in self.units or not self.units else next(iter(self.units))
 
     @property
@@ -61,20 +61,20 @@ class Numbers:
 
     @cached_property
     def thresholds(self) -> list[str]:
-        """Of the metrics that have some, as they stand in the names, increasing."""
+        """The thresholds in the metrics' names, as they are written there, increasing."""
         found = {hit[2] for name in self.units if (hit := THRESHOLD.fullmatch(name))}
         return sorted(found, key=float)
 
     @cached_property
     def scores(self) -> list[str]:
-        """The metrics, those of several thresholds once, total_bad before bad, as ``total_bad_@``."""
+        """The metrics; those with several thresholds once, as ``total_bad_@``, and total_bad before bad."""
         names = [THRESHOLD.sub(rf"\1_{AT}", name) for name in self.units]
         first = [f"{family}_{AT}" for family in ("total_bad", "bad") if f"{family}_{AT}" in names]
         return list(dict.fromkeys(first + names))
 
     @cached_property
     def columns(self) -> list[str]:
-        """Of the first table: the scores most looked at, then the costs, then all other scores."""
+        """Columns of the first table: the main scores, then the costs, then all other scores."""
         first = [s for s in self.scores if s in _FIRST]
         return [*first, *self.costs, *(s for s in self.scores if s not in first)]
 
@@ -161,7 +161,7 @@ class Numbers:
 
     @cached_property
     def costs(self) -> dict[str, dict[str, Entry]]:
-        """What it cost, by name of the column of the cells."""
+        """Column of the cells (`COSTS`) -> method -> entry."""
         measures = {"seconds": tables.seconds, "peak_mb": tables.memory}
         return {
             name: entries(measures[name](self.report.cells, self.scope), self._ranked, unit, higher=False)
@@ -170,7 +170,7 @@ class Numbers:
         }
 
     def against(self, metric: str, region: str, reference: str | None = None) -> list[dict[str, Any]]:
-        """How far each ranked method is from a reference, by default the best: a table's lines, as the script's."""
+        """The table of differences from a reference, by default the best method; a line for each ranked method."""
         found = self.differences[metric][region] if self.units else []
         means = self.means[metric][region] if self.units else {}
         known = standing.references(self.scope)
@@ -197,7 +197,7 @@ class Numbers:
         ]
 
     def data(self) -> dict[str, Any]:
-        """What the script needs of all this; NaN is None."""
+        """The numbers that the page's script needs, for JSON; None in place of NaN."""
         place = {m: i for i, m in enumerate(self.scope.methods)}
         return {
             "methods": list(self.scope.methods),
@@ -220,7 +220,7 @@ class Numbers:
 
 
 def entries(values: pd.Series, ranked: pd.Series, unit: str, higher: bool) -> dict[str, Entry]:
-    """Method -> entry."""
+    """Method -> entry, with the places of the ranked methods."""
     marks = tables.places(values[ranked], unit, higher)
     return {
         str(m): [None if pd.isna(v) else float(f"{v:.8g}"), tables.text(v, unit), int(marks.get(m, 0))]
@@ -229,12 +229,12 @@ def entries(values: pd.Series, ranked: pd.Series, unit: str, higher: bool) -> di
 
 
 def signed(value: float, digits: int = 2) -> str:
-    """A difference, as shown."""
+    """A difference as it is shown, with its sign."""
     return f"{value:+.{digits}f}" if np.isfinite(value) else "–"
 
 
 def words(verdict: str, higher: bool) -> str:
-    """A verdict as better or worse.
+    """A verdict in words: better or worse.
 
     >>> words("lower", higher=False), words("lower", higher=True), words("undecided", higher=True)
     ('better', 'worse', 'undecided')
@@ -245,7 +245,7 @@ def words(verdict: str, higher: bool) -> str:
 
 
 def turned(effect: Effect) -> Effect:
-    """The other way round."""
+    """The effect of the opposite difference: b - a for a - b."""
     return Effect(-effect.mean, -effect.high, -effect.low, -effect.size, effect.scenes)
 
 

@@ -1,4 +1,4 @@
-"""The page of a run: one file that opens anywhere, without a network."""
+"""The report page of a run: one HTML file that opens anywhere, without a network."""
 
 import re
 from base64 import b64encode
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def write_page(path: Path, report: Report) -> None:
-    """Write the page of a run, whole or not at all."""
+    """Write the page of a run. The file is complete or not there."""
     write_text(path, render(report))
 
 
@@ -38,7 +38,7 @@ def render(report: Report) -> str:
 
     report = evolve(report, results=tables.labelled(report.results), cells=tables.labelled(report.cells))
     rows = tables.summary(report.results, report.cells)
-    # one order everywhere: best first
+    # methods stand in the same order everywhere on the page: best first
     scope = evolve(tables.shared(report.results, report.cells), methods=tuple(str(m) for m in rows.index))
     numbers = Numbers(report, scope)
     shown = gallery(report, scope)
@@ -106,7 +106,7 @@ def render(report: Report) -> str:
 
 
 def _breakable(name: str) -> Markup:
-    """A name, escaped, that may go on in the next line after its marks."""
+    """A name, escaped, in which a browser may break the line after punctuation."""
     return Markup("<wbr>").join(escape(part) for part in re.split(r"(?<=[_\[=/,])", name))
 
 
@@ -116,7 +116,7 @@ def _hex(name: str) -> str:
 
 
 def _answer(rows: pd.DataFrame, scope: Shared, numbers: Numbers) -> dict[str, Any]:
-    """What the first sentence says: who is best by total_bad_1 in `all`, and how far that goes."""
+    """The facts of the first sentence: which method is best by total_bad_1 in `all`, and how sure that is."""
     scores = rows.loc[rows["ranked"], f"{METRIC} {REGION}"].dropna()
     shown = {str(m): tables.text(v, "%") for m, v in scores.items()}
     best = [m for m in shown if shown[m] == next(iter(shown.values()))]
@@ -138,7 +138,7 @@ def _answer(rows: pd.DataFrame, scope: Shared, numbers: Numbers) -> dict[str, An
 
 
 def _table(numbers: Numbers, rows: pd.DataFrame) -> list[dict[str, Any]]:
-    """Method by method: mean rank, every score, costs, as they stand in the page before anything is chosen."""
+    """The first table before anything is chosen: for each method its mean rank, scores and costs."""
     if not numbers.units:
         return []
     ranks = numbers.ranks[numbers.metric][numbers.region]
@@ -170,7 +170,7 @@ def _svg(figure: "Figure | None") -> str | None:
 
 
 def _curves(report: Report) -> list[dict[str, Any]]:
-    """Sweep by sweep: title, caption, figure and the numbers in it."""
+    """For each sweep its title, caption, figure and table."""
     return [
         {
             "title": curves.title(sweep),
@@ -184,7 +184,7 @@ def _curves(report: Report) -> list[dict[str, Any]]:
 
 
 def _methods(report: Report) -> list[dict[str, Any]]:
-    """What was run: per method its parameters, cells and cost."""
+    """What was run: for each method its parameters, cells and cost."""
     out = []
     for method, rows in report.cells.groupby("method", sort=False):
         ok = rows[rows["status"] == "ok"]

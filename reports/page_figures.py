@@ -1,4 +1,4 @@
-"""Figures of the page: accuracy against cost, curves in panels, reliability; and how they become SVG."""
+"""Figures of the report page: accuracy against cost, curves in panels, reliability; all become SVG."""
 
 import io
 import re
@@ -26,18 +26,18 @@ _LINES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 
 
 def gradient(name: str, stops: int = 17) -> str:
-    """A colour map as stops of a CSS gradient."""
+    """A colour map as the stops of a CSS gradient."""
     return ", ".join("#{:02x}{:02x}{:02x}".format(*map(int, c)) for c in palette(name, stops))
 
 
 def printable(name: str, longest: int = 44) -> str:
-    """A name of at most `longest` characters, none of which do anything."""
+    """A name shortened to `longest` characters, without control characters."""
     name = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in name)
     return name if len(name) <= longest else name[: longest // 2] + "…" + name[1 - longest // 2 :]
 
 
 def line_style(index: int) -> dict[str, Any]:
-    """Colour, points and line of the method with that number, the same in every figure."""
+    """Colour, marker and line style of the method with that number, the same in every figure."""
     return {
         "color": _COLOURS[index % len(_COLOURS)],
         "marker": _POINTS[index % len(_POINTS)],
@@ -50,7 +50,7 @@ def line_style(index: int) -> dict[str, Any]:
 
 
 def dress(axes: "Axes", size: float = 8) -> None:
-    """Axes in the page's colour, with a light grid."""
+    """Give axes the page's colour and a light grid."""
     axes.tick_params(which="both", colors=INK, labelsize=size)
     for along in (axes.xaxis, axes.yaxis):
         along.label.set_fontsize(size + 1)
@@ -60,7 +60,7 @@ def dress(axes: "Axes", size: float = 8) -> None:
 
 
 def grid_of(count: int) -> "tuple[Figure, list[Axes]]":
-    """A figure with as many panels, `ACROSS` side by side, and their axes."""
+    """A figure with `count` panels, `ACROSS` side by side, and their axes."""
     from matplotlib.figure import Figure
 
     across = min(ACROSS, count)
@@ -73,7 +73,7 @@ def grid_of(count: int) -> "tuple[Figure, list[Axes]]":
 
 
 def name_curves(figure: "Figure", methods: Sequence[str]) -> None:
-    """The methods' names below all panels, each with its line."""
+    """Write a legend with the methods' names below all panels."""
     from matplotlib.lines import Line2D
 
     names = [printable(method) for method in methods]
@@ -96,14 +96,14 @@ Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 def panels(
     parts: Sequence[tuple[str, Mapping[str, Curve]]], across: str, up: str, every: int = 1, backwards: bool = False
 ) -> "Figure | None":
-    """A panel for each part: its title, and method -> (x, y); None where there is no curve.
+    """A panel for each part (title, method -> (x, y)); None if there is no curve.
 
     Parameters
     ----------
     across, up
         Names of the axes.
     every
-        Which points are marked.
+        Every how many points a marker is drawn.
     backwards
         Whole numbers along x, the largest first.
     """
@@ -134,7 +134,7 @@ def panels(
 
 
 def _place_labels(figure: "Figure", axes: "Axes", points: Sequence[tuple[float, float, str]]) -> None:
-    """Write each name beside its point, where it covers no other name and no point."""
+    """Write each name beside its point, so that it covers no other name and no point."""
     from matplotlib.text import Text
     from matplotlib.transforms import Bbox
 
@@ -170,7 +170,7 @@ def _place_labels(figure: "Figure", axes: "Axes", points: Sequence[tuple[float, 
 
 
 def front(points: Sequence[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
-    """The points that no other beats in both numbers, from left to right."""
+    """The Pareto front: the points that no other beats in both numbers, from left to right."""
     best, kept = float("inf"), []
     for point in sorted(points):
         if point[1] < best:
@@ -183,12 +183,12 @@ COSTS = {"seconds": "seconds per scene (logarithmic)", "memory": "peak memory, M
 
 
 def cost(rows: pd.DataFrame, score: str, unit: str, against: str = "seconds") -> "Figure | None":
-    """Accuracy against what it costs: a point per ranked method of `tables.summary`, or None without any.
+    """Accuracy against cost, a point for each ranked method; None if there is none.
 
     Parameters
     ----------
     rows
-        The summary.
+        The table of `tables.summary`.
     score
         Its column for the vertical axis; less is better.
     unit
@@ -258,7 +258,7 @@ def reliability(curves: pd.DataFrame | None) -> "Figure | None":
 
 
 def svg(figure: "Figure") -> str:
-    """A figure as an ``<svg>`` element to stand in a page: no address in it, in the page's colour and font."""
+    """A figure as an ``<svg>`` element for the page: in its colour and font, and without any address."""
     from matplotlib import rc_context
 
     out = io.StringIO()

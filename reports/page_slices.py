@@ -1,4 +1,4 @@
-"""Epipolar slices in the reference view's columns: how alike the views are, what a volume holds, what follows of it."""
+"""Epipolar slices on the page, in columns of the reference view: similarity, materiality and visibility."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,10 +14,10 @@ from matbench.scene import Scene
 from matbench.space import Volume, visibility
 
 PLANES = 96
-"""Most planes of a slice of similarity."""
+"""The most planes that a slice of similarity has."""
 
-SPREAD = 10.0  # grey levels of difference at which a similarity is exp(-1/2)
-_ROWS, _COLUMNS = 1, 2  # how far the window reaches up and down, left and right
+SPREAD = 10.0  # grey levels: at this difference the similarity is exp(-1/2)
+_ROWS, _COLUMNS = 1, 2  # how far the window reaches from its middle
 
 
 @frozen(eq=False)
@@ -29,7 +29,7 @@ class PageSlice:
     values
         (planes, W) uint8, 255 is 1; columns are the reference view's pixels.
     ends
-        Disparities of its lower and upper edge, pixels per view step.
+        Disparities of the lower and the upper edge, pixels per view step.
     """
 
     values: NDArray[np.uint8]
@@ -37,17 +37,17 @@ class PageSlice:
 
 
 def rows_of(scene: Scene, asked: Sequence[int]) -> list[int]:
-    """The rows that are shown: those asked for, the middle one, and a quarter above and below the middle."""
+    """The rows shown: those asked for, the middle one, and those a quarter of the height above and below it."""
     wanted = [min(row, scene.height - 1) for row in asked]
     return list(dict.fromkeys([*wanted, scene.height // 2, scene.height // 4, 3 * scene.height // 4]))
 
 
 def similarity(scene: Scene, row: int) -> PageSlice:
-    """How alike neighbouring views are at each disparity of a row.
+    """Similarity of neighbouring views at each disparity of a row. It is for looking at; no method uses it.
 
-    exp(-SSD / (2 `SPREAD`²)) with the mean squared difference of colours in a window of 3 rows and 5
-    columns, averaged over the pairs of neighbouring views that both have the point in their
-    frame; 0 where no pair has. It is made for looking at, and is no method's own similarity.
+    exp(-SSD / (2 `SPREAD`²)), where SSD is the mean squared difference of colours in a window of 3 rows and 5
+    columns. It is averaged over the pairs of neighbouring views that both have the point in their frame, and
+    0 where there is no such pair.
     """
     least, largest = scene.disparities.least, scene.disparities.largest
     count = int(np.clip(np.ceil((largest - least) * scene.pair_steps) + 1, 2, PLANES))
@@ -77,9 +77,9 @@ def _sampled(line: NDArray[np.float32], places: NDArray[np.float32]) -> NDArray[
 
 
 def materiality(stored: StoredVolume, scene: Scene, row: int) -> tuple[PageSlice, PageSlice] | None:
-    """A row of a volume, and the share of its views that see each point past what is nearer (equation 3).
+    """Materiality in a row of a volume, and visibility: the mean over its views (equation 3 of the paper).
 
-    None where the volume does not span the reference view or the row.
+    None if the volume does not cover the reference view or the row.
     """
     if scene.ref not in stored.views or not 0 <= row < stored.space.rows or stored.space.width != scene.width:
         return None

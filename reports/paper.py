@@ -1,7 +1,7 @@
-"""The table of a run as it goes into a paper: one frame, written as LaTeX, Markdown or CSV.
+"""The table of a run for a paper, as LaTeX, Markdown or CSV.
 
-What is shown is decided once, in `Sheet`; the formats only write its texts, so that they agree to
-the last digit, with one another and with the page.
+`Sheet` decides once what is shown, and every format writes its texts. So all formats and the page agree to the
+last digit.
 """
 
 import csv
@@ -30,7 +30,7 @@ _CELLS = {"algorithm": str, "params": str, "scene": str, "status": str, "reason"
 
 @frozen(eq=False)
 class Sheet:
-    """What a table says.
+    """The content of a table, as texts.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ class Sheet:
     places
         The same rows and number columns: 1 best, 2 second, 0 neither.
     unranked
-        Method -> why its means are not compared with the others'.
+        Method -> why it is not ranked.
     notes
-        What a reader must know besides: failed cells, too few scenes.
+        What else a reader must know: failed cells, too few scenes.
     """
 
     metric: str
@@ -119,7 +119,7 @@ def sheet(
     regions: Sequence[str] = (),
     by_scene: bool = True,
 ) -> Sheet:
-    """Decide what a run's table shows.
+    """Make the table of a run.
 
     Parameters
     ----------
@@ -130,9 +130,9 @@ def sheet(
     higher
         Is more of it better?
     regions
-        Its columns; the field's own of those that were scored, if none are named.
+        The columns; if none are named, the field's own regions that were scored.
     by_scene
-        Every scene after the means, if there are several?
+        Show every scene after the means, if there are several?
 
     Raises
     ------
@@ -211,7 +211,7 @@ def formatted(made: Sheet, format: Format) -> str:
 
 
 def comma_separated(made: Sheet) -> str:
-    """One row for each scene and method, `MEAN` first; what was left without a number is told in ``note``."""
+    """CSV: one row for each scene and method, `MEAN` first. The column ``note`` says why a number is missing."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*made.texts.columns, "metric", "unit", "note"])
@@ -226,7 +226,7 @@ def _heads(made: Sheet) -> list[str]:
 
 
 def _rows(made: Sheet) -> "list[tuple[bool, list[tuple[str, int]]]]":
-    """Is it the first row of its scene? and its texts with their places; a scene's name stands once."""
+    """Each row: is it the first of its scene, and its texts with their places. A scene is named in its first row."""
     out, before = [], None
     for (_, row), (_, marks) in zip(made.texts.iterrows(), made.places.iterrows(), strict=True):
         is_new = row["scene"] != before
@@ -243,7 +243,7 @@ def _told(made: Sheet) -> list[str]:
 
 
 def markdown(made: Sheet) -> str:
-    """A table as GitHub and most others read it, its caption above and its notes below."""
+    """A Markdown table, as GitHub and most others read it, with the caption above and the notes below."""
     marks = {0: "{}", 1: "**{}**", 2: "<ins>{}</ins>"}
     heads, left = _heads(made), 2 if made.has_scenes else 1
     lines = [md(made.caption), "", "| " + " | ".join(map(md, heads)) + " |"]
@@ -253,7 +253,7 @@ def markdown(made: Sheet) -> str:
 
 
 def md(text: str) -> str:
-    """A text that Markdown shows as it is.
+    """A text escaped so that Markdown shows it as it is.
 
     >>> md("a_b|<c>")
     'a\\\\_b\\\\|&lt;c&gt;'
@@ -285,7 +285,9 @@ _TEX = {
 
 
 def tex(text: str) -> str:
-    r"""A text that LaTeX sets as it is, with the packages that `latex` names; what it cannot set becomes "?".
+    r"""A text escaped so that LaTeX sets it as it is, with the packages that `latex` names.
+
+    What it cannot set becomes "?".
 
     >>> tex("a_b{50%}")
     'a\\_b\\{50\\%\\}'

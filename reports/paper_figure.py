@@ -1,4 +1,4 @@
-"""Figures in the size of a paper's column: their look, their files, their captions."""
+"""What all figures for papers share: the size of a column, the look, the files, the captions."""
 
 import io
 import re
@@ -41,7 +41,7 @@ _LOOK = {
 
 @frozen(eq=False)
 class CaptionedFigure:
-    """A figure and what stands below it.
+    """A figure with its caption.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class CaptionedFigure:
 
 @contextmanager
 def look() -> Iterator[None]:
-    """Small print for whatever is drawn and written meanwhile."""
+    """A context in which figures are drawn and saved with the small print of a paper."""
     from matplotlib import rc_context
 
     settings: Any = _LOOK
@@ -64,7 +64,7 @@ def look() -> Iterator[None]:
 
 
 def letter(number: int) -> str:
-    """0 -> "a", 26 -> "aa".
+    """The letter of a panel: 0 -> "a", 26 -> "aa".
 
     >>> letter(0), letter(27)
     ('a', 'ab')
@@ -73,7 +73,7 @@ def letter(number: int) -> str:
 
 
 def write_figure(drawn: CaptionedFigure, stem: Path) -> list[Path]:
-    """Write a figure as PDF and PNG, its caption as text, and what a paper includes as LaTeX; the four paths."""
+    """Write a figure as PDF and PNG, its caption as text, and LaTeX that includes both; the four paths."""
     paths = [stem.with_name(stem.name + ending) for ending in (".pdf", ".png", ".txt", ".tex")]
     for path in paths[:2]:
         out = io.BytesIO()
@@ -87,6 +87,7 @@ def write_figure(drawn: CaptionedFigure, stem: Path) -> list[Path]:
 
 
 def _include(drawn: CaptionedFigure, name: str) -> str:
+    """The LaTeX that a paper inputs."""
     width = drawn.figure.get_figwidth()
     kind = "figure" if width <= INCHES["column"] else "figure*"
     label = re.sub("[^A-Za-z0-9]+", "-", name).strip("-")

@@ -1,4 +1,4 @@
-"""What methods told of every pass: their energies."""
+"""The energies that methods told of every pass."""
 
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ TOTAL = "total"
 
 
 def _told(report: Report, scope: Shared) -> dict[str, dict[str, list[NDArray[np.float64]]]]:
-    """Method -> name -> its numbers pass by pass in every cell that told two or more."""
+    """Method -> name -> the numbers of each pass, for every cell that told at least two."""
     found: dict[str, dict[str, list[NDArray[np.float64]]]] = {}
     for (algorithm, params, _, _), history in report.histories.items():
         for name, numbers in history.items():
@@ -28,7 +28,7 @@ def _told(report: Report, scope: Shared) -> dict[str, dict[str, list[NDArray[np.
 
 
 def energies(report: Report, scope: Shared) -> "Figure | None":
-    """A panel for each method with an energy: its total, in per cent of the first pass, a line for each cell."""
+    """A panel for each method with an energy: the total in per cent of the first pass, a line for each cell."""
     told = {m: names[TOTAL] for m, names in _told(report, scope).items() if TOTAL in names}
     drawn = {m: [100 * cell / cell[0] for cell in cells if cell[0] > 0] for m, cells in told.items()}
     drawn = {m: cells for m, cells in drawn.items() if cells}
@@ -53,7 +53,7 @@ def energies(report: Report, scope: Shared) -> "Figure | None":
 
 
 def lines(report: Report, scope: Shared) -> list[list[str]]:
-    """Method, what it told, cells, passes, and by how much the last pass is below or above the first, as texts."""
+    """The table as texts: method, name, cells, passes, and the change from the first pass to the last."""
     out = []
     for method, names in _told(report, scope).items():
         for name, cells in names.items():

@@ -1,4 +1,4 @@
-"""What the page shows of every scene: maps from which a browser draws all pictures, slices, spreads of errors."""
+"""The pictures of every scene on the page: encoded maps, slices, and the distribution of errors."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor
@@ -18,23 +18,23 @@ from matbench.scene import Scene
 _BESIDES = 4  # pictures of a scene besides its methods': the truth, the view, slices
 
 MOST = 13_000_000
-"""Characters that all pictures of a page may take, of the 15 MB that it may."""
+"""The most characters that all pictures may take, so that the page stays below 15 MB."""
 
 
 @frozen(eq=False)
 class Gallery:
-    """Scene by scene what is shown, for the template and, as JSON, for the script.
+    """The pictures, scene by scene, for the page's template and, as JSON, for its script.
 
     Parameters
     ----------
     scenes
-        For the template; in the order of `Shared.asked`, those without images too.
+        For the template: one for each scene of `Shared.asked`, also those without images.
     codings
-        For the script, one for each scene: how its maps are read, or None.
+        For the script, one for each scene: how to read its maps, or None.
     slices
         For the script, one for each scene: rows, each with its slices.
     spreads
-        Of each method on each scene.
+        The errors of each method on each scene.
     """
 
     scenes: list[dict[str, Any]]
@@ -44,14 +44,14 @@ class Gallery:
 
     @property
     def characters(self) -> int:
-        """About what it takes on the page."""
+        """About how many characters it takes on the page."""
         return len(json.dumps([self.scenes, self.slices]))
 
 
 def gallery(report: Report, scope: Shared, most: int = MOST) -> Gallery:
-    """All pictures of a run, the smaller the more there are.
+    """All pictures of a run; the more there are, the smaller they are.
 
-    Maps full of noise hardly compress: pictures that take more than `most` characters are drawn anew, smaller.
+    Maps full of noise hardly compress. So if all take more than `most` characters, they are made again, smaller.
     """
     longest = max((max(scene.height, scene.width) for scene in report.scenes.values()), default=LEAST_SIDE)
     side = min(side_for((len(scope.methods) + _BESIDES) * len(scope.asked)), longest)
@@ -63,7 +63,7 @@ def gallery(report: Report, scope: Shared, most: int = MOST) -> Gallery:
 
 
 def _gallery(report: Report, scope: Shared, side: int) -> Gallery:
-    """Read every map once, and every volume that was kept."""
+    """The pictures with a longer side of at most `side` px. Every map and volume is read once."""
     out = Gallery([], [], [], {})
     spreads: dict[tuple[str, str], error_spread.Spread] = {}
     for name in scope.asked:
@@ -81,7 +81,7 @@ def _gallery(report: Report, scope: Shared, side: int) -> Gallery:
         ) -> dict[str, Any]:
             return _map(report, scene, cell, coding, side, seeing)
 
-        with ThreadPoolExecutor() as pool:  # the encoder lets go of the interpreter
+        with ThreadPoolExecutor() as pool:  # the encoder releases the global interpreter lock
             maps = list(pool.map(shown, cells))
         for cell in maps:
             if (part := cell.pop("spread")) is not None:
@@ -118,7 +118,7 @@ def _gallery(report: Report, scope: Shared, side: int) -> Gallery:
 
 
 def _first_seeds(cells: pd.DataFrame, scene: str) -> list[dict[str, Any]]:
-    """One cell for each method on a scene: its first that is ok, else its first."""
+    """For each method on a scene, one cell: the first that is ok, else the first."""
     here = cells[cells["scene"] == scene].assign(bad=lambda c: c["status"] != "ok")
     first = here.sort_values("bad", kind="stable").drop_duplicates("method").sort_index()
     seeds = here.groupby("method").size()
@@ -151,7 +151,7 @@ def _map(
 
 
 def _slices(report: Report, scene: Scene, cells: list[dict[str, Any]], side: int) -> list[dict[str, Any]]:
-    """Row by row: the similarity of the views and, of every method with a volume, materiality and visibility."""
+    """For each row the similarity of the views and, for every method with a volume, materiality and visibility."""
     rows = page_slices.rows_of(scene, report.rows)
     out: list[dict[str, Any]] = [
         {"row": row, "similarity": _picture(page_slices.similarity(scene, row), side), "methods": {}} for row in rows

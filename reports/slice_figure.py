@@ -1,4 +1,4 @@
-"""The paper's figure 2: one epipolar plane as a method sees it."""
+"""A figure like the paper's figure 2: one epipolar plane as a method sees it."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -22,16 +22,16 @@ SLICE_HEIGHT = 0.55  # inches, in a column
 
 @frozen(eq=False)
 class FigureSlice:
-    """One kind of slice.
+    """One slice of the figure, such as materiality.
 
     Parameters
     ----------
     name
-        Its title.
+        The title.
     picture
         (planes, columns, 3) uint8, far to near.
     meaning
-        What its colours say, for the caption.
+        What its colours mean, for the caption.
     """
 
     name: str
@@ -41,16 +41,16 @@ class FigureSlice:
 
 @frozen(eq=False)
 class EpipolarPlane:
-    """All slices of one row.
+    """All slices of one image row.
 
     Parameters
     ----------
     space
-        Whose planes and columns they have.
+        The disparity space whose planes and columns the slices have.
     views
         Which of the scene's views that space spans, evenly spaced.
     passes
-        How many passes the method made, as far as it told.
+        How many passes the method told of.
     """
 
     row: int
@@ -66,10 +66,7 @@ class EpipolarPlane:
 
 
 def epipolar_plane(scene: Scene, probe: CapturingProbe, estimate: Estimate) -> EpipolarPlane | None:
-    """What a method told of its first row, and what its answer comes to there; None if that is nothing.
-
-    Slices are those of the last pass.
-    """
+    """The slices of the first wanted row, from the method's last pass and its answer; None if there are none."""
     (row, *_), labels = probe.wanted.rows, scene.labels
     found: list[FigureSlice] = []
     similarity, volume = probe.similarity(labels), estimate.volume
@@ -101,12 +98,12 @@ def _named(names: tuple[str, ...]) -> str:
 
 
 def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column") -> CaptionedFigure:
-    """Reference view, truth, and the slices of one row, one below the other.
+    """Draw reference view, truth, and below them the slices of one row.
 
     Parameters
     ----------
     method
-        Its name with all that was changed, for the caption.
+        The method's name with its changed parameters, for the caption.
     """
     from matplotlib.figure import Figure
 
@@ -137,7 +134,7 @@ def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column
 
 
 def _top(figure: Any, scene: Scene, row: int, truth: NDArray[np.float32] | None) -> list[str]:
-    """The reference view and its truth, the row marked; what they are."""
+    """Draw the reference view and its truth with the row marked; what the caption says of them."""
     pictures = [("reference view", scene.views[scene.ref], f"reference view {scene.labels[scene.ref]}")]
     if truth is not None:
         low, high = coloring.disparity_ends(scene)

@@ -1,4 +1,4 @@
-"""Who is ahead of whom, and whether that is real: mean ranks and paired differences over scenes."""
+"""Which method is ahead, and whether that is more than chance: mean ranks and paired differences over scenes."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -12,11 +12,11 @@ from matbench.reports.tables import Shared, text
 from matbench.spec import read_scene
 
 REFERENCES = 12
-"""Methods that all others are compared with, the best by the summary: pairs grow with the square."""
+"""How many methods, the best by the summary, others are compared with: all pairs would be too many."""
 
 
 def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
-    """The shared scenes x the ranked methods: what means, ranks and differences are over.
+    """The shared scenes x the ranked methods: means, ranks and differences are taken over these.
 
     Parameters
     ----------
@@ -25,8 +25,8 @@ def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
 
     Returns
     -------
-    One row a distinct scene: one scene with different options is one witness, its values are
-    averaged. Scenes in which the region is empty, so that no method has a value, are left out.
+    One row for each distinct scene. A scene with several options counts once: its values are averaged, as they
+    are not independent. Scenes in which the region is empty, so that no method has a value, are left out.
     """
     ranked = [m for m in scope.methods if scope.is_ranked(m)]
     chosen = table.reindex(index=list(scope.scenes), columns=ranked).dropna(how="all")
@@ -38,9 +38,9 @@ def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
 
 
 def mean_ranks(table: pd.DataFrame, scope: Shared, unit: str, higher: bool) -> dict[str, float]:
-    """Method -> its rank, 1 the best, averaged over `witnesses`; ranks go by what is shown, ties share theirs.
+    """Method -> its rank (1 is best), averaged over `witnesses`; NaN if it is not ranked or lacks a value.
 
-    NaN for a method that is not ranked, or lacks a value.
+    Ranks are those of the numbers as shown; ties share a rank.
     """
     rows = witnesses(table, scope)
     shown = rows.map(lambda value: float(text(value, unit)) if pd.notna(value) else np.nan)
@@ -50,7 +50,7 @@ def mean_ranks(table: pd.DataFrame, scope: Shared, unit: str, higher: bool) -> d
 
 @frozen
 class Difference:
-    """How far a method is from another, as `matbench.measures.statistics.Effect` of their differences."""
+    """The difference between two methods, as the `matbench.measures.statistics.Effect` of their paired differences."""
 
     method: str
     reference: str
@@ -63,7 +63,7 @@ def references(scope: Shared) -> list[str]:
 
 
 def differences(tables: Sequence[pd.DataFrame], scope: Shared) -> list[list[Difference]]:
-    """Table by table, every ranked method minus every reference that stands before it.
+    """For each table, the difference of every ranked method minus every reference that ranks before it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What each switch of a method does, in a terminal, on the page and in LaTeX."""
+"""The effect of each switch of a method, in a terminal, on the page and in LaTeX."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ def _of(ablation: pd.DataFrame, metric: str, regions: Sequence[str]) -> pd.DataF
 
 
 def lines(ablation: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
-    """One row for each algorithm, factor, level and region: what is shown, as texts.
+    """The table as texts: one row for each algorithm, factor, level and region.
 
     Columns: switch, region, change, interval, size, scenes, verdict; changes in the metric's unit.
     """
@@ -48,7 +48,7 @@ def lines(ablation: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
 
 
 def terminal(ablation: pd.DataFrame, metric: str = METRIC) -> list[Table]:
-    """The mean changes of one metric with their intervals over scenes, a table for each switch."""
+    """A table for each switch: the mean changes of one metric, with their intervals over scenes."""
     units = ablation.loc[ablation["metric"] == metric, "unit"]
     unit = f" ({units.iloc[0]})" if len(units) else ""
     out = []
@@ -75,7 +75,7 @@ def latex(ablation: pd.DataFrame, metric: str = METRIC) -> str:
 
 
 def forest(ablation: pd.DataFrame, metric: str = METRIC) -> "Figure | None":
-    """A forest plot: a line for each switch and region, its mean change and interval; None without any."""
+    """A forest plot: for each switch and region the mean change and its interval; None if there are none."""
     shown = _of(ablation, metric, ("nonocc", "all", "occ"))
     if not len(shown):
         return None

@@ -1,4 +1,4 @@
-"""The tables of a run: whatever shows numbers takes them from here, so that all agree."""
+"""The tables of a run. Page, terminal and papers all take their numbers from here, so that they agree."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,7 @@ _NO_SCENES: frozenset[str] = frozenset()
 
 
 def label(algorithm: str, params: str) -> str:
-    """How a method is called everywhere.
+    """The name of a method, the same everywhere.
 
     >>> label("sgbm", ""), label("sgbm", "fill=False")
     ('sgbm', 'sgbm[fill=False]')
@@ -25,7 +25,7 @@ def label(algorithm: str, params: str) -> str:
 
 
 def labelled(frame: pd.DataFrame) -> pd.DataFrame:
-    """`results` or `cells` with one more column, `method`; as good when read back from a file."""
+    """`results` or `cells` with a further column, `method`; also if they were read from a file."""
     if "method" in frame:
         return frame
     out = frame.copy()
@@ -39,18 +39,18 @@ def labelled(frame: pd.DataFrame) -> pd.DataFrame:
 
 @frozen
 class Shared:
-    """Which methods can be compared on which scenes.
+    """Which methods can be compared, and on which scenes.
 
     Parameters
     ----------
     methods
         All of them, in the order of the plan.
     asked
-        Every scene of the plan.
+        All scenes of the plan.
     has
         Method -> the scenes on which all its cells are ok and scored.
     scenes
-        The scenes shared by the methods that have the most; means are over these.
+        The scenes that the methods with the most scenes share; means are taken over these.
     """
 
     methods: tuple[str, ...]
@@ -60,20 +60,20 @@ class Shared:
 
     @property
     def distinct(self) -> int:
-        """How many shared scenes there are if one scene with different options is one witness."""
+        """How many different shared scenes there are; one scene with several options counts once."""
         return len({read_scene(scene).name for scene in self.scenes})
 
     def is_ranked(self, method: str) -> bool:
-        """Only who has every shared scene is compared with the others."""
+        """Has the method every shared scene? Only then is it compared with the others."""
         return bool(self.scenes) and self.has[method].issuperset(self.scenes)
 
     def counted(self, method: str) -> tuple[str, ...]:
-        """The scenes that a method's means are over: the shared ones, or its own if it lacks some."""
+        """The scenes of a method's means: the shared ones, or its own if it lacks some of them."""
         return self.scenes if self.is_ranked(method) else tuple(s for s in self.asked if s in self.has[method])
 
 
 def shared(results: pd.DataFrame, cells: pd.DataFrame) -> Shared:
-    """Find the scenes that the methods share: a cell that is not ok keeps its method off its scene."""
+    """Find the scenes that the methods share. A method lacks a scene if one of its cells there is not ok."""
     scored, planned = labelled(results), labelled(cells)
     methods = tuple(dict.fromkeys([*planned["method"].unique(), *scored["method"].unique()]))
     asked = tuple(dict.fromkeys([*planned["scene"].unique(), *scored["scene"].unique()]))
@@ -131,7 +131,7 @@ def every_scene(results: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
 
 
 def means(results: pd.DataFrame, scope: Shared, region: str, metric: str) -> pd.Series:
-    """Method -> mean over the scenes it is counted on; NaN where one of them has no value.
+    """Method -> mean over the scenes that count for it; NaN if one of them has no value.
 
     Scenes in which the region is empty, so that no method has a value, do not count.
     """
@@ -147,10 +147,10 @@ def over_scenes(table: pd.DataFrame, scope: Shared) -> pd.Series:
 
 
 def timed_alike(cells: pd.DataFrame) -> pd.Series:
-    """Which cells' seconds may be compared, as a mask.
+    """A mask of the cells whose seconds can be compared.
 
-    Those taken while no other cell ran, on one machine with one number of threads: where there are
-    several, that which has the most cells.
+    They were measured while no other cell ran, on one machine and with one number of threads. If there are
+    several such groups, it is the largest.
     """
     alone = cells.get("alone", pd.Series(True, cells.index)).astype(str) != "False"
     good = (cells["status"] == "ok") & alone
@@ -163,7 +163,7 @@ def timed_alike(cells: pd.DataFrame) -> pd.Series:
 
 
 def timing_note(cells: pd.DataFrame) -> str:
-    """What is to be said of times that are not compared; empty if all are."""
+    """A note if not all times can be compared; else empty."""
     ok = int((cells["status"] == "ok").sum())
     alike = int(timed_alike(cells).sum())
     if alike == ok:
@@ -181,7 +181,7 @@ def seconds(cells: pd.DataFrame, scope: Shared) -> pd.Series:
 
 
 def memory(cells: pd.DataFrame, scope: Shared) -> pd.Series:
-    """Method -> peak memory of the scene that took most, of those that count: what a machine must have."""
+    """Method -> the largest peak memory, in MiB, over the scenes that count: what a machine must have."""
     planned = labelled(cells)
     good = planned[planned["status"] == "ok"]
     table = good.assign(peak=good["peak_mb"].astype(float)).groupby(["scene", "method"])["peak"].max().unstack("method")
@@ -197,7 +197,7 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, hi
     results, cells
         The two tables of a run.
     metric
-        What is shown for every region.
+        The metric that is shown for every region.
     higher
         Is more of it better?
 
@@ -222,7 +222,7 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, hi
 
 
 def text(value: float, unit: str) -> str:
-    """A number as every table shows it.
+    """A number as every table shows it, without its unit.
 
     >>> text(2.345, "%"), text(0.01234, "s"), text(float("nan"), "px")
     ('2.35', '0.012', '–')
@@ -237,7 +237,7 @@ def text(value: float, unit: str) -> str:
 
 
 def places(values: pd.Series, unit: str, higher: bool = False) -> pd.Series:
-    """1 for the best, 2 for the second best, else 0, judged by what is shown: ties share a place.
+    """1 for the best, 2 for the second best, else 0, by the numbers as shown: ties share a place.
 
     Nothing is marked where all are equal or only one has a value.
     """

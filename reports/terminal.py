@@ -1,4 +1,4 @@
-"""The tables of a run in a terminal: 80 columns are enough, names are never read as markup."""
+"""The tables of a run in a terminal. They fit 80 columns, and brackets in names are not read as markup."""
 
 from collections.abc import Iterable
 
@@ -28,15 +28,15 @@ from matbench.reports.tables import text as shown
 WIDTH = 80
 NARROW = ("disc", "textureless")
 _PADDING = 2
-_NAMED = 3  # scenes named of those on which a method fails alike
+_NAMED = 3  # scenes that are named where a method fails on many for the same reason
 
 
 def tables(
     results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False, width: int = WIDTH
 ) -> list[Table]:
-    """The summary, its regions over all views, the scenes one by one and what went wrong; no empty tables.
+    """The summary, its regions over all views, every scene, and the failed cells; empty tables are left out.
 
-    Where there are fewer than `WIDTH` columns, the summary leaves out `NARROW`.
+    In a terminal of fewer than `WIDTH` columns the summary leaves out the regions of `NARROW`.
     """
     scope = shared(results, cells)
     out = []
@@ -99,13 +99,13 @@ def _summary(
 
 
 def _short(scenes: Iterable[str]) -> dict[str, str]:
-    """Scenes without their datasets, where they can still be told apart."""
+    """Scene -> its name without the dataset, if the names still differ."""
     tails = {scene: scene.partition("/")[2] or scene for scene in scenes}
     return tails if len(set(tails.values())) == len(tails) else {scene: scene for scene in tails}
 
 
 def _headings(methods: list[str], numbers: dict[str, int], room: int) -> list[str]:
-    """Names broken after underscores where they fit side by side, else the summary's numbers."""
+    """The methods' names, broken after underscores; if they do not fit side by side, their numbers in the summary."""
     names = [m.replace("_", "_\n") for m in methods]
     fits = sum(max(len(part) for part in n.split("\n")) + _PADDING for n in names) <= room
     return names if fits else [f"#{numbers[m]}" for m in methods]
@@ -148,7 +148,7 @@ def _scenes(
 
 
 def _bad(bad: pd.DataFrame) -> Table:
-    """Cells without a score; those of one method that share their reason in one row."""
+    """The cells without a score; those of one method with the same reason are in one row."""
     table = _plain(f"{len(bad)} cell{'s' if len(bad) != 1 else ''} without a score")
     for head in ("method", "scene", "seed", "status", "reason"):
         table.add_column(head, overflow="fold", justify="right" if head == "seed" else "left")

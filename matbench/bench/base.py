@@ -107,6 +107,7 @@ def last_change(code: Path, file: Path) -> str | None:
 
 def _needs(code: Path) -> tuple[Any, ...]:
     """The dependencies that a checkout declares: of Python, of the package, of its tests."""
+    # read as text: importing a commit's own packaging code would run it
     project = tomllib.loads((code / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     return (
         project.get("requires-python"),
@@ -134,6 +135,7 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
         with ExitStack() as stack:
             place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="matbench-base-")))
             code = stack.enter_context(_folder_alone(kept, place / "code"))
+            # git still lists a worktree whose folder a killed run has lost, and refuses to add it again
             _git(here.code, "worktree", "prune")
             _git(here.code, "worktree", "add", "--detach", "--quiet", str(code), digest)
             # numba reuses a compiled kernel only if its source has the same path, time and size;
@@ -143,7 +145,7 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
             environment = place / "venv"
             if _needs(code) == _needs(here.code):
                 progress(f"base {digest[:8]}: the libraries that are installed here")
-                venv.create(environment, symlinks=True)
+                venv.create(environment, symlinks=True)  # without pip: nothing is installed
                 python = _python(environment)
                 _share_libraries(python, code, here)
             else:
@@ -189,6 +191,7 @@ def _share_libraries(python: Path, code: Path, here: Tree) -> None:
     The working tree's own code is left out: else the base would be measured with it.
     """
     packages = _run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))")
+    # the standard library comes with the interpreter; listed here as well, it would stand before site-packages
     standard = {str(Path(os.__file__).parent), str(Path(os.__file__).parent / "lib-dynload")}
     shared = [
         entry
@@ -223,7 +226,7 @@ def compare(
     found: dict[str, Versus] = {}
     unsure = list(names)
     for number in range(2 * pairs):
-        if number == pairs:
+        if number == pairs:  # the second half is for what is still unsure: most verdicts need no more time
             unsure = [name for name, one in found.items() if one.verdict(margin) == "unsure"]
         if unsure:
             progress(f"pair {number + 1} of {pairs if number < pairs else 2 * pairs}: working tree and base in turns")

@@ -192,6 +192,7 @@ def judge(
     """
     old = {name: stored.ratios[name] for name in names if stored is not None and name in stored.ratios}
     ratios = {name: [timing.ratio] for name, timing in first.timings.items()}
+    # only what looks slow is measured again: a false "faster" fails nobody's build
     suspects = [name for name in old if name in ratios and ratios[name][0] > old[name] * (1 + min(SUSPECT, margin))]
     failed = {name: "not measured" for name in names if name not in ratios} | dict(first.failed)
     decided = decide(suspects) if suspects else ()

@@ -156,7 +156,7 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
     """
     import cv2
 
-    cv2.setNumThreads(1)
+    cv2.setNumThreads(1)  # the peer would else use all cores, and the others one
     settings = sorted({s for axis in AXES.values() for s in axis}, key=lambda s: s[0] * s[1] * s[2] * (s[3] - 1))
     scenes: dict[tuple[int, int, int, int], Scene] = {}
     instances = {name: _instance(name) for name in methods}
@@ -173,7 +173,7 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
             for name in methods:
                 point = points.setdefault((name, setting), Point(name, setting))
                 if time.monotonic() > end:
-                    continue
+                    continue  # and not break: every point must be there, if only as left out
                 progress(f"round {number}: {name}, {_words(setting)}")
                 if setting not in scenes:
                     scenes[setting] = _scene(setting)
@@ -214,7 +214,7 @@ def _fits(growth: Growth, methods: Sequence[str]) -> Iterator[Fit]:
     for name in methods:
         for axis in AXES:
             curve = growth.of(name, axis)
-            if len(curve) > 2:
+            if len(curve) > 2:  # two points fit any line: there would be no interval
                 at = np.array([point.along(axis) for point in curve])
                 work = np.array([float(point.counter[1]) for point in curve])
                 yield Fit(

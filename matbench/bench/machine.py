@@ -18,7 +18,7 @@ def _processor() -> str:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             key, _, value = line.partition(":")
             found.setdefault(key.strip(), value.strip())
-    except OSError:
+    except OSError:  # not Linux
         return platform.processor() or platform.machine()
     name = found.get("model name") or platform.processor() or platform.machine()
     numbers = "/".join(found.get(key, "?") for key in ("cpu family", "model", "stepping"))

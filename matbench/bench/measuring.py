@@ -20,6 +20,7 @@ from matbench.measures.statistics import median_interval
 from matbench.plans.plugins import kernel_cache
 
 BENCHMARKS = Path("tests", "benchmarks")
+# a subject's rounds come in three parts, spread over the sitting: a disturbance then spoils one part and not all
 ROUNDS, PARTS = 25, 3
 # bytes: malloc keeps freed blocks up to this size instead of giving them back to the system. Else every round
 # would get fresh pages, and the time would be mostly that of the system clearing them.
@@ -125,7 +126,7 @@ def _pytest(tree: Tree, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [str(tree.python), "-m", "pytest", "-c", str(tree.code / "pyproject.toml"), "-p", "no:cacheprovider"]
     return subprocess.run(  # noqa: S603 (this interpreter, no shell)
         [*command, "-q", f"--confcutdir={benchmarks}", str(benchmarks / "test_speed.py"), *arguments],
-        cwd=tree.code,  # `python -m` looks there first
+        cwd=tree.code,  # `python -m` imports from there first: the tree's own code, whatever else is installed
         env=environment(tree),
         capture_output=True,
         text=True,
@@ -174,6 +175,7 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS) -> Sitting:
             measured = found["measured"]
         except (OSError, ValueError, KeyError):
             raise UserError(f"nothing was measured in {tree.code}: {_last_line(done)}") from None
+    # an installed matbench that comes first in the path would be measured under a false name
     if Path(measured["code"]) != tree.code.resolve():
         raise UserError(f"{measured['code']} was measured instead of {tree.code}: is another matbench before it?")
     parts: dict[str, list[Any]] = {}
@@ -214,7 +216,7 @@ def run_program(tree: Tree, name: str) -> Any:
     )
     if done.returncode:
         raise UserError(f"{tests}/{name}.py failed: {_last_line(done)}")
-    return json.loads(done.stdout.splitlines()[-1])
+    return json.loads(done.stdout.splitlines()[-1])  # the last line: libraries may print before it
 
 
 def _last_line(done: subprocess.CompletedProcess[str]) -> str:

@@ -60,6 +60,7 @@ def in_turns(
         If a process measures other code than its tree's.
     """
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [0]
+    # both on one core: cores differ in speed and temperature, and what disturbs one core then disturbs both trees
     core = cores[number % len(cores)]
     with ExitStack() as stack:
 
@@ -115,7 +116,7 @@ class _Side:
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        self._process.kill()
+        self._process.kill()  # it holds nothing worth keeping, and may be in the middle of a long call
         self._process.communicate()
 
     def begin(self) -> None:

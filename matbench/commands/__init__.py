@@ -1,1 +1,1 @@
-"""Commands in modules of their own, imported when they are typed."""
+"""The commands of `matbench`, one module each. A module is imported when its command is typed: `--help` stays quick."""

@@ -49,7 +49,7 @@ other work than counted before.
 @Parameter(name="*")
 @frozen
 class Choice:
-    """What is measured, and how it is told."""
+    """What is measured, and how the results are printed."""
 
     only: Annotated[
         list[str], Parameter(negative="", show_default=False, help="Method, kernel or pattern; may be repeated.")
@@ -122,7 +122,7 @@ def _check(
 
 
 class _Output:
-    """Tables and lines as they are asked for; in JSON, one document at the end."""
+    """Prints tables and lines as text or Markdown; with ``--json``, one document at the end."""
 
     def __init__(self, choice: Choice) -> None:
         self._choice = choice
@@ -144,7 +144,7 @@ class _Output:
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[str], None]]:
-        """Tell on the terminal, beside the output, what is going on; elsewhere, a line for each step of it."""
+        """Show progress on the error stream: a status line in a terminal, elsewhere one line for each step."""
         beside = Console(stderr=True)
         if beside.is_terminal:
             with beside.status("starting") as status:
@@ -165,7 +165,7 @@ class _Output:
 
 
 def _plain(value: Any) -> Any:
-    """NaN is no JSON."""
+    """The value with None in place of NaN, which JSON does not have."""
     if isinstance(value, dict):
         return {key: _plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
@@ -175,7 +175,7 @@ def _plain(value: Any) -> Any:
 
 @frozen
 class _Judging:
-    """The working tree against what is stored."""
+    """Judges the working tree by the stored counters and ratios."""
 
     tree: Any
     names: Sequence[str]
@@ -191,7 +191,7 @@ class _Judging:
         return self.baselines or folder(self.tree)
 
     def update(self, work: bool, compile: bool) -> int:
-        """Store counters and ratios; always of all subjects, as the commit that stores them stands for all."""
+        """Store counters and ratios, always of all subjects: one commit then stands for the whole file."""
         from matbench.bench import baselines, counting, tables
         from matbench.bench.compilation import compile_all
 
@@ -213,7 +213,7 @@ class _Judging:
         return DONE
 
     def check(self, work: bool, compile: bool) -> int:
-        """Both layers, and compilation if it is asked for."""
+        """Check counters and times, and compilation if asked for; the exit status is the worst of them."""
         steps = [self._counters] if work else []
         steps += [self._times]
         steps += [self._compilation] if compile else []
@@ -276,7 +276,7 @@ class _Judging:
         return REGRESSION if slower else DONE if results and not failed else FAILED
 
     def _in_turns(self, suspects: Sequence[str], commit: str | None, stored: Any) -> Any:
-        """The working tree against the code whose ratios are stored."""
+        """Measure the working tree in turns with the code whose ratios are stored."""
         from matbench.bench import base
         from matbench.bench.baselines import code_digest
 
@@ -314,7 +314,7 @@ class _Judging:
 
 
 def _how(slower: Any, commit: str | None) -> str:
-    """How that was found."""
+    """How a subject was found to be slower, in words."""
     if slower.against is None:
         return (
             f"in {len(slower.ratios)} processes: {' '.join(f'{r:.4g}' for r in slower.ratios)} for {slower.stored:.4g}"
@@ -331,7 +331,7 @@ def _against(
     output: _Output,
     progress: Callable[[str], None],
 ) -> int:
-    """The working tree against another commit."""
+    """Measure the working tree in turns with another commit, and print the verdicts."""
     from matbench.bench import tables
     from matbench.bench.base import base_tree, commit, compare
 
@@ -349,7 +349,7 @@ def _against(
 
 
 def _grow(choice: Choice, seconds: float, out: Path | None, output: _Output) -> int:
-    """Growth over pixels, disparities and views."""
+    """Measure and print how time grows with pixels, disparities and views."""
     from matbench.plans.plugins import kernel_cache
 
     os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))  # numba reads it when it is imported

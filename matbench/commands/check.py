@@ -1,4 +1,4 @@
-"""`matbench check`: does a method keep to what the harness asks of it?"""
+"""`matbench check`: does a method keep its promises to the harness?"""
 
 import json
 import math
@@ -85,7 +85,7 @@ def check(
 
 
 def _read(names: Sequence[str], plugin: Sequence[Path]) -> tuple[list[Method], list[Path]]:
-    """The methods that are meant, and all files that hold methods."""
+    """The methods that the words mean, and all files with methods."""
     files = [path.resolve() for path in plugin]
     selectors: list[str] = []
     for name in names:
@@ -100,7 +100,7 @@ def _read(names: Sequence[str], plugin: Sequence[Path]) -> tuple[list[Method], l
 
 
 def _passes(found: Sequence[CheckResult]) -> bool:
-    """No check fails, and not everything was skipped."""
+    """Does no check fail, and was not everything skipped?"""
     verdicts = [finding.verdict for finding in found if finding.check != "quiet"]
     return "fail" not in verdicts and "pass" in verdicts
 

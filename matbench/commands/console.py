@@ -1,4 +1,4 @@
-"""What every command prints with, and the exit status that it ends with."""
+"""The console that every command prints with, and the exit statuses."""
 
 from rich import console as rich_console
 
@@ -6,10 +6,10 @@ DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 
 class Console(rich_console.Console):
-    """A console that prints what it is told, word for word, and leaves a broken pipe to `main`."""
+    """A console that can print lines as they are; a broken pipe is raised, for `main` to handle."""
 
     def say(self, line: str) -> None:
-        """Print a line that may be of any length and hold anything, such as paths."""
+        """Print a line as it is: not wrapped, and brackets in it are not markup. For paths and names."""
         self.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def on_broken_pipe(self) -> None:

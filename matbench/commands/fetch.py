@@ -1,4 +1,4 @@
-"""`matbench fetch`: bring real scenes from the sites that publish them."""
+"""`matbench fetch`: download real scenes from the sites that publish them."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -37,7 +37,7 @@ they are free for research, and ask for citation.
     help_format="markdown",
 )
 
-_SHOWN = 4  # reasons of one scene
+_SHOWN = 4  # reasons printed for one scene
 
 
 @app.default
@@ -93,7 +93,7 @@ def _megabytes(count: int) -> str:
 
 
 def _plan(console: Console, looked: Sequence[Result], site: str | None) -> None:
-    """Say what would be fetched."""
+    """Print what would be fetched, and from where."""
     total = 0
     for result in looked:
         one, missing = result.download, set(result.missing)
@@ -111,7 +111,7 @@ def _plan(console: Console, looked: Sequence[Result], site: str | None) -> None:
 
 
 def _fetch(console: Console, chosen: Sequence[Download], root: Path, site: str | None, patience: Patience) -> int:
-    """Bring scenes with progress shown, and give an account; the exit status."""
+    """Fetch scenes with progress shown, and print a summary; the exit status."""
     results: list[Result] = []
     columns = (BarColumn(24), TextColumn("{task.description}"), DownloadColumn(), TransferSpeedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
@@ -143,7 +143,7 @@ def _fetch(console: Console, chosen: Sequence[Download], root: Path, site: str |
 
 
 def _outcome(result: Result) -> str:
-    """One scene in one line."""
+    """The result of one scene, in one line."""
     name, every = result.download.name, len(result.download.files)
     if result.missing:
         return f" failed  {name}: {len(result.missing)} of {_files(every)} missing"
@@ -154,7 +154,7 @@ def _outcome(result: Result) -> str:
 
 
 def _account(console: Console, results: Sequence[Result], root: Path) -> None:
-    """What came, what was there, what failed, why, and what to do about it."""
+    """Print what came, what was there, what failed and why, and how to get it by hand."""
     failed = [result for result in results if result.missing]
     for result in failed:
         console.say(f"\n{result.download.name}: {', '.join(result.missing)} missing")

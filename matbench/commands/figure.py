@@ -1,4 +1,4 @@
-"""`matbench figure`: the paper's figures 2 and 3, of any run."""
+"""`matbench figure`: figures like 2 and 3 of the paper, drawn from any run."""
 
 import shlex
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def slice_(
 ) -> int:
     """Draw one epipolar plane of a cell: similarity, visibility, materiality, energy derivative (the paper's figure 2).
 
-    The cell is solved once more, listening; that the answer is the stored one is checked and said.
+    The cell is solved once more to see inside the method. You are told if the answer is not the stored one.
 
     **Examples**
 
@@ -184,7 +184,7 @@ def maps(
 
 
 def _one(cells: "Sequence[Cell]", part: str | None) -> "Cell":
-    """The one cell whose name or key contains `part`, or is it."""
+    """The one cell whose name or key is `part` or, failing that, contains it."""
     hits = [c for c in cells if part is None or part in str(c) or part in c.key]
     exact = [c for c in hits if str(c) == part]
     if len(exact or hits) != 1:
@@ -194,7 +194,7 @@ def _one(cells: "Sequence[Cell]", part: str | None) -> "Cell":
 
 
 def _matching(kind: str, names: list[str], wanted: list[str] | None) -> list[str]:
-    """The names that are or match one of those wanted, or contain it."""
+    """The names that equal, match or contain one of those wanted."""
     from fnmatch import fnmatchcase
 
     if wanted is None:
@@ -208,7 +208,7 @@ def _matching(kind: str, names: list[str], wanted: list[str] | None) -> list[str
 
 
 def _scene(cell: "Cell", data: Path | None, console: Console) -> "Scene":
-    """The scene of a cell, as it was in the run."""
+    """The scene of a cell; refused if it has changed since the run."""
     from matbench.scenes.catalogue import load_scene
 
     with console.status(f"{cell.scene}: reading"):
@@ -227,7 +227,7 @@ def _stored(store: "Store", cell: "Cell", scene: "Scene") -> "NDArray[np.float32
 
 
 def _stem(out: Path | None, run: Path, name: str) -> Path:
-    """Where a figure goes, without an ending; its folder is there."""
+    """The path of a figure without its ending; refused if the folder does not exist."""
     import re
 
     stem = run / re.sub(r"[^\w.+]+", "-", name).strip("-.") if out is None else out

@@ -103,7 +103,7 @@ def _scene(found: Any) -> dict[str, Any]:
 
 
 def tables(everything: dict[str, Any]) -> list[Table]:
-    """The same as tables for a terminal."""
+    """What `known` gives, as tables for a terminal."""
     methods = Table("algorithm", "parameters and defaults", title="Algorithms", title_justify="left", expand=False)
     for name, facts in everything["algorithms"].items():
         if "error" in facts:

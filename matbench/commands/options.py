@@ -1,4 +1,4 @@
-"""Options that several commands take."""
+"""Options that several commands share."""
 
 import re
 from pathlib import Path
@@ -24,13 +24,14 @@ Plugins = Annotated[
 
 
 def many(short: str, long: str, text: str) -> Parameter:
+    """An option that takes several values and may be repeated."""
     return Parameter(name=[long, short], consume_multiple=True, negative="", help=text)
 
 
 @Parameter(name="*")
 @frozen
 class Options:
-    """What `compare` and `ablate` both take."""
+    """The options that `compare` and `ablate` share."""
 
     data: Data = None
     out: Annotated[Path | None, Parameter(help="Run folder; default runs/ and a digest of what is asked for.")] = None
@@ -91,7 +92,7 @@ class Options:
 
     @property
     def settings(self) -> Settings:
-        """How to run, but for what is kept."""
+        """The settings of the run, except what is kept of each cell: only `compare` can choose that."""
         return Settings(
             self.data,
             timeout=self.timeout,
@@ -112,7 +113,7 @@ DEFAULTS = Options()
 
 
 def whole(name: str, text: str) -> int:
-    """A number as typed; one that is not whole is refused, not rounded."""
+    """A whole number as it was typed; anything else is refused, not rounded."""
     if not re.fullmatch(r"[0-9]{1,9}", text):
         raise UserError(f"{name} {text!r} is not a whole number from 0 to 999999999")
     return int(text)
@@ -128,7 +129,7 @@ def check_metric(metric: str) -> None:
 
 
 def is_of_volumes(metric: str) -> bool:
-    """Is this metric one of volumes, which are then kept?"""
+    """Does this metric score volumes? Then they must be kept."""
     from matbench.results import scores
 
     return scores.of_volumes(metric)

@@ -1,4 +1,4 @@
-"""What is shown while cells are computed: which run now, how many are done and failed, how long it may take yet."""
+"""Progress of a run: which cells run now, how many are done and failed, and about how long the rest takes."""
 
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -15,24 +15,24 @@ from matbench.commands.console import Console
 from matbench.plans.plan import Cell
 from matbench.runs.store import FINAL, Outcome
 
-SHOWN = 8  # cells that run at once and are named
+SHOWN = 8  # running cells that are named; of the others the number is shown
 _BAR = 24
 
 
 @define(eq=False)
 class Progress:
-    """Told as cells start and end, shows a terminal what goes on, and whoever else reads a line for each that ended.
+    """Shows progress: a live display in a terminal; elsewhere one line for each cell that ends.
 
     Parameters
     ----------
     console
-        Where it is shown; None for nowhere.
+        Where progress is shown; None for nowhere.
     todo
         The cells that will be computed.
     done
-        How many of the plan are done already.
+        How many cells of the plan are done already.
     clock
-        Seconds that only grow.
+        A clock in seconds that never goes back.
     """
 
     console: Console | None
@@ -62,7 +62,7 @@ class Progress:
             self._live.stop()
 
     def __call__(self, event: str, cell: Cell, outcome: Outcome | None) -> None:
-        """Hear of a cell; several may start before one ends."""
+        """Take note that a cell starts or ends. Several may start before one ends."""
         if event == "start":
             self._waiting.pop(cell.key, None)
             self._running[cell.key] = (cell, self.clock())
@@ -89,9 +89,10 @@ class Progress:
         return self.done + len(self._running) + len(self._waiting)
 
     def seconds_left(self) -> float | None:
-        """About how long it will take yet, from what cells of the same method took; None before one has ended.
+        """An estimate of the seconds left; None before the first cell has ended.
 
-        A method that has not ended anywhere is taken to need the mean of the others.
+        A cell is expected to take the mean time of its method's earlier cells. A method without any is expected
+        to take the mean of all methods.
         """
         if not self._took:
             return None
@@ -103,7 +104,7 @@ class Progress:
         return max(sum(expected) / self._at_once, max(expected, default=0.0))
 
     def _shown(self) -> Group:
-        """A line of counts below a bar, and one for each cell that runs, cut at the terminal's edge."""
+        """A bar with the counts, then a line for each running cell, cut at the terminal's edge."""
         total = self.total
         said = [f"{self.done}/{total} cells"]
         if self.failed:
@@ -127,7 +128,7 @@ def _line(text: str) -> Text:
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people say them.
+    """A duration in words.
 
     >>> duration(4.2), duration(75), duration(7500)
     ('4 s', '1 min', '2 h 5 min')

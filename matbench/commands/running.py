@@ -1,4 +1,4 @@
-"""What `compare` and `ablate` share: a comparison run with progress shown, its tables printed, its report written."""
+"""What `compare` and `ablate` share: run a comparison with progress, print its tables, write its report."""
 
 import json
 import math
@@ -29,15 +29,15 @@ from matbench.scenes.catalogue import DATA_VARIABLE, data_root
 
 @frozen
 class Voice:
-    """Who is spoken to, and how.
+    """Where a command prints, and what.
 
-    A person gets progress and tables. With ``--quiet`` only the run folder is printed, and what failed to the
-    error stream. With ``--json`` one document is printed at the end, and progress goes to the error stream.
+    By default progress and tables. With ``--quiet`` only the run folder, and failed cells to the error stream.
+    With ``--json`` one document at the end, and progress to the error stream.
 
     Parameters
     ----------
     talk
-        For progress and remarks, line by line; None for none.
+        The console for progress and remarks; None for none.
     quiet, as_json
         The options.
     """
@@ -52,12 +52,12 @@ class Voice:
         return cls(talk, options.quiet, options.as_json)
 
     def say(self, line: str) -> None:
-        """Print a remark, if anybody listens."""
+        """Print a remark, unless ``--quiet`` was given."""
         if self.talk is not None:
             self.talk.say(line)
 
     def busy(self, what: str) -> AbstractContextManager[object]:
-        """Show a terminal what takes a while."""
+        """A context that shows, in a terminal, what is being done."""
         return nullcontext() if self.talk is None or not self.talk.is_terminal else self.talk.status(what)
 
 
@@ -75,7 +75,7 @@ def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
         except FolderLost as error:
             print(f"matbench: stopped: {error}", file=sys.stderr)
             return FAILED
-        except OSError as error:  # the tables are what does not fit any more
+        except OSError as error:  # cells were written, but the disk has no room for the tables
             print(f"matbench: stopped: {FolderLost.of(ready.folder, error)}", file=sys.stderr)
             return FAILED
     if stopped:
@@ -85,7 +85,7 @@ def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
 
 
 def show_plan(ready: Comparison, options: Options) -> int:
-    """Say what a run would do, and why; nothing is written."""
+    """Print which cells would run, and why; nothing is written."""
     todo = explained(ready.plan, ready.store, ready.settings)
     total, stale = len(ready.plan.cells), len(ready.store.stale(ready.plan))
     if options.as_json:
@@ -115,7 +115,7 @@ def show_plan(ready: Comparison, options: Options) -> int:
 def publish(
     ready: Comparison, metric: str, is_ablation: bool, voice: Voice, stopped: bool = False, say_paths: bool = True
 ) -> Any:
-    """Score, write and print tables and report; the table of cells."""
+    """Score the run, write and print its tables, write its report; returns the table of cells."""
     with voice.busy("scoring"):
         results, cells = ready.tables()
         sweeps = ready.sweeps(results)
@@ -156,7 +156,7 @@ def _say_paths(ready: Comparison, written: dict[str, Path], voice: Voice) -> Non
 def document(
     ready: Comparison, results: Any, cells: Any, metric: str, written: dict[str, Path], stopped: bool
 ) -> dict[str, Any]:
-    """What `--json` prints: where the run is, what became of its cells, and the rows of the printed summary.
+    """The document of `--json`: the run folder, the status of its cells, and the rows of the summary.
 
     Keys: ``folder``; ``files``, what was written; ``interrupted``; ``cells``, status -> how many; ``unscored``,
     each cell without a score with its reason; ``left_out``, why -> scenes; ``metric``; ``table``, the methods, best
@@ -214,7 +214,7 @@ def _say_failed(cells: Any) -> None:
 
 
 def say_missing(missing: Sequence[str], options: Options) -> None:
-    """Say which of the default scenes are not there, and how they can be had."""
+    """Print which default scenes are missing, and how to get them."""
     if missing:
         data = options.data
         root = data_root(data)
@@ -226,7 +226,7 @@ def say_missing(missing: Sequence[str], options: Options) -> None:
 
 
 def _run(ready: Comparison, voice: Voice) -> bool:
-    """Run a comparison with progress shown; True if it was interrupted."""
+    """Run a comparison and show progress; True if it was interrupted."""
     todo = pending(ready.plan, ready.store, ready.settings)
     total = len(ready.plan.cells)
     if len(todo) < total:
@@ -242,7 +242,10 @@ def _run(ready: Comparison, voice: Voice) -> bool:
 
 @contextmanager
 def _ended_as_by_ctrl_c() -> Iterator[None]:
-    """When the system tells this process to end, let it end as if Ctrl-C had been typed."""
+    """Treat SIGTERM as Ctrl-C in this block.
+
+    Batch systems end jobs with it. The running cells are then ended, and the tables are written, all the same.
+    """
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
@@ -251,7 +254,7 @@ def _ended_as_by_ctrl_c() -> Iterator[None]:
 
 
 def _measured(results: Any, metric: str, voice: Voice) -> str:
-    """The metric to show: the one asked for, else, as of scenes without truth, one that was measured."""
+    """The metric to print: the one asked for; if it was not measured, as on scenes without truth, one that was."""
     measured = list(dict.fromkeys(results["metric"]))
     if not measured or metric in measured:
         return metric

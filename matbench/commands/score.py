@@ -1,4 +1,4 @@
-"""`matbench score`: the tables of a run, or of several, made anew from the stored maps."""
+"""`matbench score`: make the tables of a run, or of several, again from the stored maps."""
 
 import tempfile
 from collections.abc import Sequence
@@ -82,7 +82,7 @@ def score(
 
 
 def _folder(run: Path, aside: Path, console: Console) -> Path:
-    """A run folder as it is; an archive unpacked and checked."""
+    """The folder of a run; an archive is unpacked into `aside` and checked."""
     if run.is_dir():
         return run
     archive.unpack(run, aside)
@@ -91,7 +91,7 @@ def _folder(run: Path, aside: Path, console: Console) -> Path:
 
 
 def _claimed(folder: Path) -> str:
-    """The scorer that an archive's tables say they are from."""
+    """The digest of the scorer that made an archive's tables, as the archive says."""
     made = freshness.made(Store(folder))
     return made.scorer if made else "an unknown one"
 
@@ -125,7 +125,7 @@ _KEYS = ("algorithm", "params", "scene", "view", "seed", "region", "metric")
 
 
 def _read(path: Path) -> "pd.DataFrame | None":
-    """A table as text, so that what is equal is equal byte for byte; None if there is none that can be read."""
+    """A table with every value as text, to compare byte for byte; None if it is missing or unreadable."""
     try:
         table = pd.read_csv(path, dtype=str, keep_default_na=False)
     except (OSError, ValueError):
@@ -134,7 +134,7 @@ def _read(path: Path) -> "pd.DataFrame | None":
 
 
 def _changes(before: "pd.DataFrame | None", after: "pd.DataFrame | None") -> Sequence[str]:
-    """The scores that differ, a line each."""
+    """The scores that differ, one line each."""
     if before is None or after is None:
         return []
     old, new = (table.drop_duplicates(list(_KEYS)).set_index(list(_KEYS))["value"] for table in (before, after))
