@@ -107,7 +107,6 @@ def last_change(code: Path, file: Path) -> str | None:
 
 def _needs(code: Path) -> tuple[Any, ...]:
     """The dependencies that a checkout declares: of Python, of the package, of its tests."""
-    # read as text: importing a commit's own packaging code would run it
     project = tomllib.loads((code / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     return (
         project.get("requires-python"),
@@ -191,7 +190,7 @@ def _share_libraries(python: Path, code: Path, here: Tree) -> None:
     The working tree's own code is left out: else the base would be measured with it.
     """
     packages = _run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))")
-    # the standard library comes with the interpreter; listed here as well, it would stand before site-packages
+    # the base's interpreter has a standard library of its own
     standard = {str(Path(os.__file__).parent), str(Path(os.__file__).parent / "lib-dynload")}
     shared = [
         entry

@@ -8,7 +8,7 @@ from numba import njit
 
 _TRIAD = 1 << 23  # numbers: three arrays of 32 MiB, beyond most caches, so that memory is measured
 _TERMS, _ROWS = 32, 2000
-# a multiply and an add may become one instruction (contract), else half of the arithmetic would go unmeasured
+# "contract" makes one instruction of a multiply and an add; without it the machine would seem half as fast
 _compiled = njit(nogil=True, fastmath={"contract", "reassoc", "nsz"})
 
 
