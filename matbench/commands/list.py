@@ -85,8 +85,8 @@ def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
             name: {
                 "type": spec.describe(one.kind),
                 "default": None if one.default is empty else _plain(one.default),
-                "group": one.group,
             }
+            | ({"group": one.group} if one.group else {})
             for name, one in parameters.items()
         },
     }
@@ -115,7 +115,7 @@ def tables(everything: dict[str, Any]) -> list[Table]:
             methods.add_row(escape(name), f"[red]{escape(facts['error'])}[/]")
             continue
         lines = [facts["about"], *(f"  preset={preset}" for preset in facts["presets"])]
-        for group, members in groupby(facts["parameters"].items(), key=lambda item: item[1]["group"]):
+        for group, members in groupby(facts["parameters"].items(), key=lambda item: item[1].get("group", "")):
             lines += [f" {group.replace('_', ' ')}:"] if group else []
             lines += [f"  {key}={_shown(one['default'])}: {one['type']}" for key, one in members]
         methods.add_row(escape(name), escape("\n".join(lines)))
