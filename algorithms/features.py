@@ -19,7 +19,7 @@ def luma(rows: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def gradient(grey: NDArray[np.float32], fineness: int) -> NDArray[np.float32]:
-    """Half the difference of the samples one pixel to the right and to the left; beyond an edge, its last sample."""
+    """Half the difference of the samples one pixel to the right and to the left; beyond an edge its last is taken."""
     q = fineness
     wide = np.concatenate([np.repeat(grey[..., :1], q, -1), grey, np.repeat(grey[..., -1:], q, -1)], axis=-1)
     return np.asarray((wide[..., 2 * q :] - wide[..., : -2 * q]) * np.float32(0.5), np.float32)
@@ -52,8 +52,8 @@ def _census(wide, fineness, bits):  # type: ignore[no-untyped-def]
 def census(grey: NDArray[np.float32], fineness: int) -> NDArray[np.uint16]:
     """(views, 3, H, samples) census: one bit for each of the 48 pixels around, set where it is darker.
 
-    From above left, row by row, 16 to a word, the first one highest. Neighbours are whole pixels
-    away, `fineness` samples; beyond an edge the nearest sample stands for them.
+    The 7x7 pixels are taken row by row from the upper left one, 16 to a word, the first in the
+    highest bit. Pixels are `fineness` samples apart; beyond the image's edge its last sample is repeated.
     """
     reach = CENSUS_RADIUS * fineness
     wide = np.pad(grey, ((0, 0), (0, 0), (reach, reach)), mode="edge")
@@ -76,7 +76,7 @@ def _push(gap, near, bits):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _alike(wide, fineness, most, bits):  # type: ignore[no-untyped-def]
+def _mark_same_surface(wide, fineness, most, bits):  # type: ignore[no-untyped-def]
     views, _, height, samples = bits.shape
     middle = CENSUS_RADIUS * fineness
     gap = np.empty(samples, np.float32)
@@ -101,12 +101,12 @@ def _alike(wide, fineness, most, bits):  # type: ignore[no-untyped-def]
                     number += 1
 
 
-def alike(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.uint16]:
-    """(views, 3, H, samples) which of the pixels of a census are likely on the same surface as the middle one.
+def same_surface(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.uint16]:
+    """(views, 3, H, samples) which of the 48 pixels of a census are likely on the same surface as the middle one.
 
-    A bit is set for the eight next to it, and where no channel differs by more than `most` grey
-    levels. What lies across a depth jump moves on its own between views and says nothing about the
-    pixel; its colour tends to differ.
+    A bit is set for each of the eight next to it, and for each whose channels all differ by at most
+    `most` grey levels. Across a depth jump pixels move differently between the views, so they say
+    nothing about the middle one; their colour tends to differ. Bits are in the order of `census`.
 
     Parameters
     ----------
@@ -116,5 +116,5 @@ def alike(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.u
     reach = CENSUS_RADIUS * fineness
     wide = np.pad(rows, ((0, 0), (0, 0), (0, 0), (reach, reach)), mode="edge")
     bits = np.zeros((len(rows), CENSUS_WORDS, *rows.shape[2:]), np.uint16)
-    _alike(wide, fineness, np.float32(most), bits)
+    _mark_same_surface(wide, fineness, np.float32(most), bits)
     return bits

@@ -3,14 +3,16 @@
 from collections.abc import Callable
 
 import numpy as np
-from attrs import evolve, field, frozen, validators
+from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import fill, helper, kernel
 from matbench.algorithms.parallel import over_rows
-from matbench.algorithms.similarity import FULL, Features, Matcher, pairs
+from matbench.algorithms.similarity import FULL, Matcher
+from matbench.algorithms.windows import Features
 
-PRIOR, ENDED = 0.5, 0.05  # weight of what no view tells, against 1 for a view that sees a point; its materiality
+# what is assumed of a point before any view is asked: it weighs as half a view would, a tenth of whose rays end there
+PRIOR, ENDED = 0.5, 0.05
 
 
 @helper
@@ -100,7 +102,9 @@ def weigh_seen(rho, pairs, maps, view, spans, y0, fineness, hidden, cost, materi
     maps
         (views, H, W) plane in which the ray of every pixel ends, fractions included.
     spans
-        (views, planes, 6) what `Matcher.ray_spans` says of the view that is read and every other.
+        (views, planes, 6) what `Matcher.ray_spans` says of the reference view and every other.
+    view
+        Index of the reference view.
     y0
         Row of the views that is the first of `rho`.
     cost, material
@@ -157,7 +161,8 @@ def _weights(image, y, x, radius, fall, weight):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _add(part, share, total):  # type: ignore[no-untyped-def]
+def _add_share(part, share, total):  # type: ignore[no-untyped-def]
+    """total += share * part."""
     for k in range(total.size):
         total[k] += share * part[k]
 
@@ -174,7 +179,7 @@ def support(cost, image, first, skipped, fall, radius, out):  # type: ignore[no-
     first
         Row of the image that is the first of `out`.
     image
-        (H, W, 3) uint8 view that is read.
+        (H, W, 3) uint8 reference view.
     fall
         (256,) weight by the largest difference over the colours.
     out
@@ -190,12 +195,12 @@ def support(cost, image, first, skipped, fall, radius, out):  # type: ignore[no-
                 for dx in range(-radius, radius + 1):
                     share = weight[dy + radius, dx + radius]
                     if share > 0:
-                        _add(cost[row + skipped + dy, x + dx], share, total)
+                        _add_share(cost[row + skipped + dy, x + dx], share, total)
 
 
-@frozen(slots=False)  # a second base class must not have slots
+@frozen
 class Fusion:
-    """How the similarities of several pairs become one cost on the rays of a view.
+    """How the similarities of several pairs become one cost on the rays of the reference view.
 
     Parameters
     ----------
@@ -228,7 +233,7 @@ class Fusion:
         With d_j the plane in which the ray of view j ends, w_j(k) = max(0, 1 - |k - d_j|) says where
         it ends and V_j(k) = 1 - sum of w_j(k') over k' > k + 1 what it reaches: a plane does not
         hide the one behind it, as surfaces may lie between the two. Then, over the pairs and over
-        the views j other than the one that is read,
+        the views j other than the reference,
 
         - cost = (sum V_i V_j (1 - rho_ij) + 0.5 hidden) / (sum V_i V_j + 0.5),
         - mu = (sum w_j + 0.05) / (sum V_j + 0.5).
@@ -279,9 +284,3 @@ class Fusion:
 
         over_rows(fill_rows, space.rows, threads)
         return cost
-
-
-def seen_from(matcher: Matcher, view: int) -> Matcher:
-    """The same views matched from one of them; of pairs of the reference, that view is part of every one."""
-    scene = evolve(matcher.scene, ref=view, regions={})
-    return evolve(matcher, scene=scene, pairs=pairs(matcher.space.views, matcher.settings.pairs, view))

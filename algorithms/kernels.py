@@ -29,6 +29,13 @@ def fill(value, row):  # type: ignore[no-untyped-def]
         row[x] = value
 
 
+@helper
+def add(values, row):  # type: ignore[no-untyped-def]
+    """row += values."""
+    for x in range(row.size):
+        row[x] += values[x]
+
+
 def _popcount(_: Any, word: Any) -> Any:
     def count(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
         return builder.ctpop(arguments[0])

@@ -1,31 +1,44 @@
-"""The control of materiality: its similarity, reader and mending, without materiality."""
+"""The control of materiality: its similarities, inference and mending, without materiality."""
 
-from attrs import frozen
+from collections.abc import Mapping
+
+from attrs import field, frozen
 
 from matbench.algorithm import Context, Estimate
-from matbench.algorithms.fusion import seen_from
-from matbench.algorithms.readings import Readings
+from matbench.algorithms.inference import Inference
 from matbench.algorithms.similarity import Matcher, Matching
 from matbench.scene import Scene
+from matbench.spec import flat
 
 
+@flat
 @frozen
-class MultiviewSGM(Matching, Readings):
+class MultiviewSGM:
     """Semi-global matching over 1 - mean rho_ij, over the better half of the pairs with both frusta.
 
     The better half, rounded up, is chosen for every point: with half of the views hidden from it, the
-    other half still tells. The maps of all views are read and mended where they contradict one
-    another. What materiality gains, it must gain over this: views, planes, pairs, similarity, reader
-    and mending are the same (parameters of `Matching` and `Readings`), only visibility and mu are
-    missing. A second reading would find nothing new, as the better half is the same again.
+    other half still tells. The maps of all views are inferred, and mended where they contradict one
+    another. What materiality gains, it must gain over this: views, planes, pairs, similarities, inference
+    and mending are the same (parameters of `Matching` and `Inference`), only visibility and mu are
+    missing. A second pass would find nothing new, as the better half is the same again.
     """
+
+    matching: Matching = field(factory=Matching)
+    inference: Inference = field(factory=Inference)
+
+    @property
+    def silent(self) -> Mapping[str, str]:
+        """The parameters that are not read beside the others -> what they take to be read."""
+        return {**self.matching.silent, **self.inference.silent(self.matching)}
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """The reference view's map, with an answer everywhere."""
-        matcher = Matcher.of(scene, self)
-        maps = self.first(matcher, context.threads)
-        compared = sum(seen_from(matcher, view).ray_comparisons for view in range(matcher.space.views))
+        matcher = Matcher.of(scene, self.matching)
+        maps = self.inference.initial_maps(matcher, context.threads)
         return Estimate(
             disparity={scene.ref: matcher.disparity(maps[matcher.scene.ref])},
-            work={"pair_similarities": compared, "volume_bytes": self.volume_bytes(matcher, again=False)},
+            work={
+                "pair_similarities": self.inference.comparisons(matcher),
+                "volume_bytes": self.inference.volume_bytes(matcher, refined=False),
+            },
         )

@@ -1,4 +1,4 @@
-"""Semi-global matching (Hirschmueller 2008): 8-path aggregation, winner and sub-pixel fit."""
+"""Semi-global matching (Hirschmueller 2008): costs aggregated along eight paths, the winner and its sub-pixel fit."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -11,7 +11,8 @@ from matbench.algorithms.kernels import helper, kernel
 
 @helper
 def _least(values):  # type: ignore[no-untyped-def]
-    """The least of some numbers, none NaN; four chains, as each step waits for the one before."""
+    """The least of some numbers, none NaN."""
+    # four minima at once: in a single chain every step would wait for the one before
     a = b = c = d = values[0]
     whole = values.size - values.size % 4
     for k in range(0, whole, 4):
@@ -181,9 +182,9 @@ def _energies(cost, image, planes, small, large):  # type: ignore[no-untyped-def
     return found
 
 
-@frozen(slots=False)  # a second base class must not have slots
+@frozen
 class SemiGlobal:
-    """How costs in [0, 1] are read: what materiality and its control have in common.
+    """Disparities from costs in [0, 1] by semi-global matching.
 
     Parameters
     ----------
@@ -199,15 +200,15 @@ class SemiGlobal:
     large_step: float = field(default=1.0, validator=validators.ge(0))
     contrast: float = field(default=25.0, validator=validators.gt(0))
 
-    def read(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
-        """(H, W) plane index, to a fraction of a plane, of the least cost in view of its neighbours.
+    def infer(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
+        """(H, W) plane index, to a fraction of a plane, of the least sum of path costs (`aggregate`, `winner`).
 
         Parameters
         ----------
         cost
             (H, W, K); NaN = unknown: such a plane is never the answer.
         image
-            (H, W, 3) the view that is read.
+            (H, W, 3) uint8, the view whose rays the costs are on.
 
         Returns
         -------
@@ -216,7 +217,7 @@ class SemiGlobal:
         return np.asarray(winner(self.sums(cost, image, threads), cost))
 
     def energy(self, cost: NDArray[np.float32], image: NDArray[np.uint8], planes: NDArray[np.float32]) -> float:
-        """What a map costs, per pixel: the energy that `read` looks for the least of (Hirschmueller 2008, equation 3).
+        """What a map costs per pixel (Hirschmueller 2008, equation 3): `infer` seeks the map of the least energy.
 
         E = sum over pixels of cost(p, D_p) + sum over neighbours, eight around a pixel and each pair once,
         of P1 where their planes differ by one and of P2 where they differ by more.
@@ -224,7 +225,7 @@ class SemiGlobal:
         Parameters
         ----------
         cost, image
-            As for `read`.
+            As for `infer`.
         planes
             (H, W) plane indices, rounded to whole ones; a pixel without an answer (NaN) pays nothing.
         """

@@ -1,5 +1,6 @@
 """Two-view semi-global matching as everybody has it: OpenCV's StereoSGBM."""
 
+from collections.abc import Mapping
 from math import ceil, floor
 from typing import Literal
 
@@ -66,6 +67,11 @@ class SGBM:
     def __attrs_post_init__(self) -> None:
         if self.p2 <= self.p1:
             raise ValueError(f"p2 is {self.p2}; it must exceed p1, {self.p1}")
+
+    @property
+    def silent(self) -> Mapping[str, str]:
+        """The parameters that are not read beside the others -> what they take to be read."""
+        return {} if self.speckle_window else {"speckle_range": "speckle_window above 0"}
 
     def solve(self, scene: Scene, context: Context) -> Estimate:  # noqa: ARG002 (nothing to seed)
         """Disparities of the reference view."""

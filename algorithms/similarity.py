@@ -1,26 +1,34 @@
 """Similarities rho_ij of windows in pairs of views, over all target points (docs/concepts/methods.md)."""
 
+from collections.abc import Mapping
 from itertools import combinations, pairwise
 from typing import Literal, get_args
 
 import numpy as np
-from attrs import field, frozen, validators
+from attrs import evolve, field, frozen, validators
 from numpy.typing import NDArray
 
-from matbench.algorithms.features import alike, census, gradient, luma
+from matbench.algorithms.features import census, gradient, luma, same_surface
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
 from matbench.algorithms.sampling import by_phase, fine_rows, search_space
-from matbench.algorithms.windows import CENSUS, EXPONENTIAL, LINEAR, MIXED, ROOT, SQUARES, pair_rows
+from matbench.algorithms.windows import (
+    CENSUS,
+    EXPONENTIAL,
+    LINEAR,
+    MIXED,
+    ROOT,
+    SQUARES,
+    Criterion,
+    Features,
+    pair_rows,
+)
 from matbench.algorithms.windows import FULL as FULL
 from matbench.scene import Scene
 from matbench.space import DisparitySpace
 
 PairSet = Literal["all", "consecutive", "reference"]
 Form = Literal["ssd", "rms", "linear", "census", "mixed"]
-# (views, phases, channels, H, samples) colours or luma, (views, phases, H, samples) gradients,
-# (views, phases, words, H, samples) census, alike pixels
-Features = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint16], NDArray[np.uint16]]
 
 
 def pairs(views: int, which: PairSet, ref: int = 0) -> NDArray[np.int64]:
@@ -35,7 +43,7 @@ def pairs(views: int, which: PairSet, ref: int = 0) -> NDArray[np.int64]:
 
 @frozen
 class Matching:
-    """Which views are compared, where and how: what materiality and its control have in common.
+    """Matching costs: which views are compared, where and how. A group of parameters.
 
     Parameters
     ----------
@@ -64,9 +72,9 @@ class Matching:
     colour
         Compare colours, or only luma: 0.299 R + 0.587 G + 0.114 B.
     alike
-        Grey levels: a census compares the eight next pixels and those whose colours in both windows
-        are within so many of the middle pixel's (h is scaled to 48 bits), as what lies across a
-        depth jump says nothing about a pixel; 0 = all 48.
+        Grey levels: a census compares the eight next pixels, and those whose colours are within so many
+        of the middle pixel's in both views (h is scaled up to 48 bits). What lies across a depth jump says
+        nothing about a pixel. 0 compares all 48.
     """
 
     views: int = field(default=9, validator=all_or_several)
@@ -78,6 +86,18 @@ class Matching:
     truncation: float = field(default=20.0, validator=validators.ge(0))
     colour: bool = True
     alike: float = field(default=10.0, validator=validators.ge(0))
+
+    @property
+    def silent(self) -> Mapping[str, str]:
+        """The parameters that this similarity does not read -> what they take to be read."""
+        form = self.similarity
+        takes = {
+            "sigma": (form in ("ssd", "rms"), "similarity=ssd or rms"),
+            "truncation": (form != "census", "another similarity than census"),
+            "alike": (form in ("census", "mixed"), "similarity=census or mixed"),
+            "colour": (form != "census" or self.alike > 0, "another similarity than census, or alike above 0"),
+        }
+        return {name: condition for name, (is_read, condition) in takes.items() if not is_read}
 
 
 @frozen(eq=False)
@@ -97,9 +117,10 @@ class Matcher:
     rows
         (views, channels, H, samples) float32 rows sampled at the space's fineness: colours, or luma.
     slopes
-        (views, H, samples) horizontal gradients of the luma; no rows where nothing reads them.
-    bits, alike
-        (views, words, H, samples) census of the luma, and which of its pixels are like its middle.
+        (views, H, samples) horizontal gradients of the luma; H is 0 if the similarity does not use them.
+    bits, masks
+        (views, words, H, samples) census of the luma, and which of its pixels are likely on the same surface
+        as the middle one; H is 0 if the similarity does not use them.
     settings
         How windows are compared.
     """
@@ -111,7 +132,7 @@ class Matcher:
     rows: NDArray[np.float32]
     slopes: NDArray[np.float32]
     bits: NDArray[np.uint16]
-    alike: NDArray[np.uint16]
+    masks: NDArray[np.uint16]
     settings: Matching
 
     @classmethod
@@ -121,14 +142,20 @@ class Matcher:
         chosen = scene.choose(indices)
         space = search_space(chosen, settings.fineness)
         rows = fine_rows(chosen.views, space.fineness)
-        grey, read = luma(rows), settings.similarity
-        slopes = gradient(grey if read == "mixed" else grey[:, :0], space.fineness)
-        bits = census(grey if read in ("census", "mixed") else grey[:, :0], space.fineness)
+        grey, form = luma(rows), settings.similarity
+        slopes = gradient(grey if form == "mixed" else grey[:, :0], space.fineness)
+        bits = census(grey if form in ("census", "mixed") else grey[:, :0], space.fineness)
         if not settings.colour:
             rows = grey[:, None]
-        near = alike(rows if bits.size and settings.alike else rows[:, :, :0], space.fineness, settings.alike)
+        is_masked = bits.size and settings.alike
+        masks = same_surface(rows if is_masked else rows[:, :, :0], space.fineness, settings.alike)
         chosen_pairs = pairs(chosen.n, settings.pairs, chosen.ref)
-        return cls(chosen, indices, space, chosen_pairs, rows, slopes, bits, near, settings)
+        return cls(chosen, indices, space, chosen_pairs, rows, slopes, bits, masks, settings)
+
+    def with_reference(self, view: int) -> "Matcher":
+        """The same views with another reference view; of ``reference`` pairs, it is part of every one."""
+        scene = evolve(self.scene, ref=view, regions={})
+        return evolve(self, scene=scene, pairs=pairs(self.space.views, self.settings.pairs, view))
 
     @property
     def step(self) -> int:
@@ -194,8 +221,14 @@ class Matcher:
     def rays(self, phases: Features, first: int, end: int, window: int | None = None) -> NDArray[np.uint8]:
         """(end - first, pairs, planes, width) what `block` holds at the whole pixels of the reference view.
 
-        Windows end where the reference image does, too. `phases`, from the method of that name, are
-        computed once, as they serve every view and all rows. `window` may replace that of the settings.
+        Here windows end where the reference image does, too.
+
+        Parameters
+        ----------
+        phases
+            From the method of that name: they serve every reference view and all rows.
+        window
+            Side of the window in pixels, if it is not that of the settings.
         """
         space = self.space
         out = np.zeros((end - first, len(self.pairs), space.planes, space.width), np.uint8)
@@ -210,18 +243,19 @@ class Matcher:
         return out
 
     def phases(self) -> Features:
-        """The rows sorted by their phase within a pixel, so that every q-th sample is read contiguously."""
-        return tuple(by_phase(part, self.space.fineness) for part in (self.rows, self.slopes, self.bits, self.alike))  # type: ignore[return-value]
+        """Rows and their features sorted by phase within a pixel, so that every q-th sample is read contiguously."""
+        parts = (by_phase(part, self.space.fineness) for part in (self.rows, self.slopes, self.bits, self.masks))
+        return Features(*parts)  # type: ignore[arg-type]
 
     def _fill(self, first: int, out: NDArray[np.uint8]) -> None:
-        whole = self.rows[:, None], self.slopes[:, None], self.bits[:, None], self.alike[:, None]
+        whole = Features(self.rows[:, None], self.slopes[:, None], self.bits[:, None], self.masks[:, None])
         self._compare(whole, first, out, on_rays=False)
 
     def _compare(
         self, features: Features, first: int, out: NDArray[np.uint8], on_rays: bool, window: int | None = None
     ) -> None:
-        settings, (rows, slopes, bits, near) = self.settings, features
-        channels, limit = (0,) * rows.shape[2], settings.truncation
+        settings, limit = self.settings, self.settings.truncation
+        channels = (0,) * features.rows.shape[2]
         side = settings.window if window is None else window
         measure, shape, rate = {
             "ssd": (SQUARES, EXPONENTIAL, settings.sigma**-2),
@@ -231,23 +265,20 @@ class Matcher:
             "mixed": (MIXED, LINEAR, 1.0),
         }[settings.similarity]
         limit = len(channels) * limit if measure == MIXED else limit**2
+        criterion = Criterion(
+            measure,
+            shape,
+            rate,
+            np.float32(limit or np.inf),
+            (0,) * bool(features.masks.size),
+            channels,
+            (0,) * side,
+        )
         for p, (i, j) in enumerate(self.pairs):
             pair_rows(
-                rows[i],
-                rows[j],
-                slopes[i],
-                slopes[j],
-                bits[i],
-                bits[j],
-                near[i],
-                near[j],
-                measure,
-                shape,
-                rate,
-                np.float32(limit or np.inf),
-                (0,) * bool(near.size),
-                channels,
-                (0,) * side,
+                features.of(i),
+                features.of(j),
+                criterion,
                 self.ray_spans(i, j) if on_rays else self.spans(i, j),
                 1 if on_rays else self.space.fineness,
                 first,

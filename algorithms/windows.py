@@ -1,12 +1,14 @@
 """Similarities of windows in one pair of views (docs/concepts/methods.md), plane by plane and row by row.
 
-Rows of a view are (phases, channels, H, samples) colours, (phases, H, samples) gradients and
-(phases, words, H, samples) census; what is compared at a point is sample `x + ui` of one view with
-sample `x + uj` of the other. Offsets are unsigned: signed ones might count from an array's end, which
-keeps loops from being vectorised.
+At a point, sample `x + ui` of phase `fi` of one view is compared with sample `x + uj` of phase `fj` of the
+other. Offsets are unsigned: signed ones might count from an array's end, which keeps loops from being
+vectorised.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from matbench.algorithms.features import CENSUS_BITS, CENSUS_WORDS
 from matbench.algorithms.kernels import fill, helper, kernel, popcount
@@ -17,6 +19,56 @@ COLOUR_SPAN, SLOPE_SPAN, ORDER_SPAN = 20.0, 10.0, 20.0  # differences that cost 
 SQUARES, CENSUS, MIXED = range(3)  # what is averaged over a window
 EXPONENTIAL, ROOT, LINEAR = range(3)  # how the mean becomes a similarity
 TILE = 4  # planes
+
+
+class Features(NamedTuple):
+    """What is compared of the views, or without the first axis of one view; samples are sorted by `by_phase`.
+
+    Parameters
+    ----------
+    rows
+        (views, phases, channels, H, samples) float32 colours or luma, in grey levels.
+    slopes
+        (views, phases, H, samples) float32 horizontal gradients of the luma.
+    bits, masks
+        (views, phases, words, H, samples) uint16: census of the luma, and which of its pixels are likely
+        on the same surface as the middle one.
+    """
+
+    rows: NDArray[np.float32]
+    slopes: NDArray[np.float32]
+    bits: NDArray[np.uint16]
+    masks: NDArray[np.uint16]
+
+    def of(self, view: int) -> "Features":
+        """Those of one view."""
+        return Features(self.rows[view], self.slopes[view], self.bits[view], self.masks[view])
+
+
+class Criterion(NamedTuple):
+    """How two windows are compared.
+
+    Parameters
+    ----------
+    measure, shape
+        Which differences are averaged (`SQUARES`, ...), and how their mean becomes a similarity (`LINEAR`, ...).
+    rate
+        Of the exponential, or of the linear fall.
+    limit
+        The most that the colours of a pixel may differ: of mean squares, or of the sum of absolutes.
+    masked
+        Empty to compare all bits of the census; else only those set in the `masks` of both views.
+    channels, taps
+        As long as there are channels, and taps along a side of the window: the compiler counts tuples.
+    """
+
+    measure: int
+    shape: int
+    rate: float
+    limit: np.float32
+    masked: tuple[int, ...]
+    channels: tuple[int, ...]
+    taps: tuple[int, ...]
 
 
 @helper
@@ -33,33 +85,32 @@ def square_difference(left, right, fi, ui, fj, uj, row, channels, limit, out):  
 
 @helper
 def _count_differing(left, right, fi, ui, fj, uj, row, differing):  # type: ignore[no-untyped-def]
-    """How many of the census bits of two pixels differ; here and below words are short, so that many fit a vector."""
+    """How many of the census bits of two pixels differ."""
+    # words of 16 bits, here and below: twice as many of them fit a vector as of 32
     for x in range(np.uintp(differing.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
         count = np.uint16(0)
         for word in range(CENSUS_WORDS):
-            count = np.uint16(count + popcount(np.uint16(left[fi, word, row, i] ^ right[fj, word, row, j])))
+            count = np.uint16(count + popcount(np.uint16(left.bits[fi, word, row, i] ^ right.bits[fj, word, row, j])))
         differing[x] = count
 
 
 @helper
-def _count_differing_among(  # type: ignore[no-untyped-def]
-    left, right, left_alike, right_alike, fi, ui, fj, uj, row, differing, compared
-):
-    """How many bits differ among those that are set in both `alike`, and how many these are."""
+def _count_differing_among(left, right, fi, ui, fj, uj, row, differing, compared):  # type: ignore[no-untyped-def]
+    """How many bits differ among those that are set in the masks of both views, and how many these are."""
     for x in range(np.uintp(differing.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
         differ, among = np.uint16(0), np.uint16(0)
         for word in range(CENSUS_WORDS):
-            both = np.uint16(left_alike[fi, word, row, i] & right_alike[fj, word, row, j])
-            unlike = np.uint16((left[fi, word, row, i] ^ right[fj, word, row, j]) & both)
+            both = np.uint16(left.masks[fi, word, row, i] & right.masks[fj, word, row, j])
+            unlike = np.uint16((left.bits[fi, word, row, i] ^ right.bits[fj, word, row, j]) & both)
             differ, among = np.uint16(differ + popcount(unlike)), np.uint16(among + popcount(both))
         differing[x], compared[x] = differ, among
 
 
 @helper
 def _census_difference(differing, compared, masked, out):  # type: ignore[no-untyped-def]
-    """out = min(h, 20) / 20, with h how many of 48 bits differ, or would, were all as those compared."""
+    """out = min(h, 20) / 20, with h how many of 48 bits differ; of fewer compared ones, scaled up to 48."""
     share, most, bits = np.float32(1 / ORDER_SPAN), np.float32(ORDER_SPAN), np.float32(CENSUS_BITS)
     for x in range(np.uintp(out.size)):
         differ = np.float32(differing[x])
@@ -70,7 +121,7 @@ def _census_difference(differing, compared, masked, out):  # type: ignore[no-unt
 
 @helper
 def _mixed_difference(  # type: ignore[no-untyped-def]
-    left, right, left_slope, right_slope, differing, compared, fi, ui, fj, uj, row, masked, channels, limit, out
+    left, right, fi, ui, fj, uj, row, differing, compared, masked, channels, limit, out
 ):
     """out = the cost of ``mixed`` at every pixel, between 0 and 1 unless `limit` allows more."""
     colour, slope = np.float32(COLOUR / COLOUR_SPAN / len(channels)), np.float32(SLOPE / SLOPE_SPAN)
@@ -80,8 +131,8 @@ def _mixed_difference(  # type: ignore[no-untyped-def]
         i, j = x + np.uintp(ui), x + np.uintp(uj)
         total = zero
         for c in range(len(channels)):
-            total += abs(left[fi, c, row, i] - right[fj, c, row, j])
-        steep = abs(left_slope[fi, row, i] - right_slope[fj, row, j])
+            total += abs(left.rows[fi, c, row, i] - right.rows[fj, c, row, j])
+        steep = abs(left.slopes[fi, row, i] - right.slopes[fj, row, j])
         differ = np.float32(differing[x])
         if len(masked) > 0:
             differ = bits * differ / np.float32(compared[x])
@@ -146,10 +197,7 @@ def _tap_shares(fineness, radius, width, weight):  # type: ignore[no-untyped-def
 
 
 @kernel
-def pair_rows(  # type: ignore[no-untyped-def]
-    left, right, left_slope, right_slope, left_bits, right_bits, left_alike, right_alike, measure, shape, rate, limit,
-    masked, channels, taps, spans, fineness, y0, p, out,
-):  # fmt: skip
+def pair_rows(left, right, criterion, spans, fineness, y0, p, out):  # type: ignore[no-untyped-def]
     """Similarities of pair p for the rows y0, y0 + 1, ... of `out` (rows, pairs, planes, columns).
 
     Differences of a row are computed once and kept while windows of the plane need them; taps that
@@ -157,23 +205,18 @@ def pair_rows(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    measure, shape
-        Which differences are averaged, and how their mean becomes a similarity.
-    rate
-        Of the exponential, or of the linear fall.
-    limit
-        The most that the colours of a pixel may differ: of mean squares, or of the sum of absolutes.
-    masked
-        A tuple, empty to compare all bits of the census; else only those set in both `alike`.
-    channels, taps
-        Tuples as long as there are channels, and taps along a side of the window: the compiler counts them.
+    left, right
+        `Features` of the pair's views.
+    criterion
+        `Criterion`.
     spans
         (planes, 6) first column in `out` and number of columns, then phase and sample where they
         start in either view.
     fineness
         Samples from tap to tap.
     """
-    height, samples = left.shape[2], left.shape[3]
+    height, samples = left.rows.shape[2], left.rows.shape[3]
+    measure, shape, rate, limit, masked, channels, taps = criterion
     side = len(taps)
     radius = side // 2
     reach = radius * fineness
@@ -200,22 +243,19 @@ def pair_rows(  # type: ignore[no-untyped-def]
                 if row < 0 or row >= height:
                     fill(zero, cost)
                 elif measure == SQUARES:
-                    square_difference(left, right, fi, ui, fj, uj, row, channels, limit, cost)
+                    square_difference(left.rows, right.rows, fi, ui, fj, uj, row, channels, limit, cost)
                 else:
                     differ, among = differing[:width], compared[:width]
                     if len(masked) > 0:
-                        _count_differing_among(
-                            left_bits, right_bits, left_alike, right_alike, fi, ui, fj, uj, row, differ, among
-                        )
+                        _count_differing_among(left, right, fi, ui, fj, uj, row, differ, among)
                     else:
-                        _count_differing(left_bits, right_bits, fi, ui, fj, uj, row, differ)
+                        _count_differing(left, right, fi, ui, fj, uj, row, differ)
                     if measure == CENSUS:
                         _census_difference(differ, among, masked, cost)
                     else:
                         _mixed_difference(
-                            left, right, left_slope, right_slope, differ, among, fi, ui, fj, uj, row, masked, channels,
-                            limit, cost,
-                        )  # fmt: skip
+                            left, right, fi, ui, fj, uj, row, differ, among, masked, channels, limit, cost
+                        )
                 if y < y0:
                     continue
                 _sum_rows(near, taps, column[reach : reach + width])

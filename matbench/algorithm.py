@@ -85,12 +85,17 @@ class Context:
 class Algorithm(Protocol):
     """A method: an attrs class or dataclass whose fields are its parameters.
 
+    A field whose type is an attrs class is a group: what is typed are that class's fields, by their own names.
+
     Optional besides `solve`:
 
     ``unsupported_reason(self, scene) -> str | None``
         Why this scene cannot be solved; its cell is then skipped, not failed.
     ``presets: ClassVar[Mapping[str, Mapping[str, object]]]``
         Named sets of parameters, chosen as ``name[preset=paper]``.
+    ``silent: Mapping[str, str]``
+        The parameters that nothing reads beside the values of the others -> what they take to be read, such
+        as ``{"sharpness": "start=soft"}``. One of them that is typed is refused in one line.
     ``code_files: Sequence[Path]``
         Files besides its own code whose content decides its answers, such as a program or weights.
     """

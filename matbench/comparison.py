@@ -170,6 +170,7 @@ class Comparison:
                 volumes=volume,
                 histories={key: outcome.history for key, outcome in outcomes.items() if outcome is not None},
                 parameters={(c.method.algorithm, c.method.changed): c.method.params for c in self.plan.cells},
+                groups={c.method.algorithm: _groups(c.method.algorithm) for c in self.plan.cells},
                 rows=self.settings.record.rows if self.settings.record is not None else (),
             ),
         )
@@ -188,6 +189,16 @@ class Comparison:
         if note := tables.timing_note(cells):
             facts["times"] = note
         return facts
+
+
+def _groups(algorithm: str) -> dict[str, str]:
+    """Parameter -> group of an installed method; of another none: what a run folder names is not executed."""
+    plugin = plugins.installed("algorithms").get(algorithm)
+    try:
+        known = {} if plugin is None else spec.parameters(plugin.load())
+    except UserError:
+        return {}
+    return {name: one.group for name, one in known.items() if one.group}
 
 
 def default_algorithms() -> list[str]:

@@ -8,17 +8,18 @@ stands before them may be a glob pattern.
 import inspect
 import re
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, wraps
 from itertools import product
 from math import isfinite
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from attrs import field, frozen
+from attrs import Factory, evolve, field, fields_dict, frozen, has
 from cattrs import Converter
 
 from matbench.errors import UserError, unknown
 
 Value = bool | int | float | str | None
+T = TypeVar("T")
 
 
 @frozen
@@ -155,14 +156,62 @@ def describe(kind: Any) -> str:
     return {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}.get(kind, str(kind))
 
 
-def parameters(cls: type) -> dict[str, tuple[Any, Any]]:
-    """Name -> (type, default) of every parameter of a method; `inspect.Parameter.empty` for none.
+@frozen
+class Parameter:
+    """One parameter of a method, as it is typed.
+
+    Parameters
+    ----------
+    kind
+        Its type.
+    default
+        `inspect.Parameter.empty` if it must be given.
+    group
+        The argument of the constructor that holds it; empty if it is one itself.
+    """
+
+    kind: Any
+    default: Any
+    group: str = ""
+
+
+def parameters(cls: type) -> dict[str, Parameter]:
+    """Every parameter of a method by its name.
+
+    An argument of the constructor whose type is an attrs class is a group: its fields are parameters under their own
+    names, and no two may share one. The group's default may set other defaults than its fields have.
 
     Raises
     ------
     UserError
-        If they cannot be read, as with an annotation that names nothing.
+        If they cannot be read, as with an annotation that names nothing, or a name stands twice.
     """
+    found: dict[str, Parameter] = {}
+    arguments = _arguments(cls)
+    for name, (kind, default) in arguments.items():
+        if is_group(kind):
+            given = values_of(default) if isinstance(default, kind) else {}
+            own = {
+                key: evolve(one, group=name, default=given.get(key, one.default))
+                for key, one in parameters(kind).items()
+            }
+            if twice := [key for key in own if key in found or key in arguments]:
+                raise UserError(
+                    f"{cls.__name__}: parameter {twice[0]!r} of group {name!r} has the name of another: rename one"
+                )
+        else:
+            own = {name: Parameter(kind, default)}
+        found |= own
+    return found
+
+
+def is_group(kind: Any) -> bool:
+    """Is an argument of that type a group of parameters?"""
+    return isinstance(kind, type) and has(kind)
+
+
+def _arguments(cls: type) -> dict[str, tuple[Any, Any]]:
+    """Name -> (type, default) of every argument of a constructor, groups as they are."""
     try:
         hints = get_type_hints(vars(cls)["__init__"]) if "__init__" in vars(cls) else {}
         signature = inspect.signature(cls)
@@ -170,12 +219,80 @@ def parameters(cls: type) -> dict[str, tuple[Any, Any]]:
         raise UserError(f"{cls!r} is no method: its parameters cannot be read: {first_line(error)}") from error
     kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     taken = [p for p in signature.parameters.values() if p.kind in kinds]
-    return {p.name: (hints.get(p.name, _kind_of(p.default)), p.default) for p in taken}
+    return {p.name: (hints.get(p.name, _kind_of(p.default)), _default(cls, p)) for p in taken}
+
+
+def _default(cls: type, argument: inspect.Parameter) -> Any:
+    """What an argument is if it is not given, also where an attrs class has a factory for it."""
+    field_ = fields_dict(cls).get(argument.name) if has(cls) else None
+    made: Any = None if field_ is None else field_.default
+    return made.factory() if isinstance(made, Factory) and not made.takes_self else argument.default  # type: ignore[arg-type]
+
+
+def _grouped(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments that say the same with groups; of a group given whole, the others' values stay."""
+    taken = dict(given)
+    for name, (kind, default) in _arguments(cls).items():
+        if is_group(kind):
+            own = {key: taken.pop(key) for key in parameters(kind) if key in taken}
+            whole = taken.get(name, default)
+            if own or whole is inspect.Parameter.empty:
+                kept = values_of(whole) if isinstance(whole, kind) else {}
+                taken[name] = kind(**_grouped(kind, kept | own))
+    return taken
+
+
+def flat(cls: type[T]) -> type[T]:
+    """Let the constructor of a class take parameters of its groups by their own names, too.
+
+    ``Materiality(pairs="all")`` is then ``Materiality(matching=Matching(pairs="all"))``, and `attrs.evolve`
+    takes ``pairs="all"`` as well. One that changes nothing (`silent_in`) is refused by a ValueError, unless
+    it has its default.
+    """
+    made = cls.__init__
+
+    @wraps(made)
+    def init(self: T, *args: Any, **given: Any) -> None:
+        made(self, *args, **_grouped(cls, given))
+        known, silent = parameters(cls), silent_in(self)
+        for key, value in given.items():
+            if key in silent and known[key].group and value != known[key].default:
+                raise ValueError(_changes_nothing(key, value, silent))
+
+    cls.__init__ = init  # type: ignore[method-assign, assignment]
+    return cls
+
+
+def silent_in(instance: object) -> Mapping[str, str]:
+    """The parameters that nothing reads beside the values of the others -> what they take to be read.
+
+    None where a method's `silent` is something else.
+    """
+    silent = getattr(instance, "silent", {})
+    return silent if isinstance(silent, Mapping) else {}
+
+
+def refuse_silent(name: str, instance: object, options: Mapping[str, Any]) -> None:
+    """Refuse options of which nothing would come.
+
+    Raises
+    ------
+    UserError
+        If one of them is a parameter that changes nothing beside the values of the others.
+    """
+    silent = silent_in(instance)
+    for key, value in options.items():
+        if key in silent:
+            raise UserError(f"{name}: {_changes_nothing(key, value, silent)}")
+
+
+def _changes_nothing(key: str, value: Any, silent: Mapping[str, str]) -> str:
+    return f"{key}={_typed(value)} changes nothing here: it takes {silent[key]}"
 
 
 def required(cls: type) -> list[str]:
     """The parameters that have no default."""
-    return [key for key, (_, default) in parameters(cls).items() if default is inspect.Parameter.empty]
+    return [key for key, one in parameters(cls).items() if one.default is inspect.Parameter.empty]
 
 
 def _kind_of(default: object) -> Any:
@@ -209,7 +326,7 @@ def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
     for key, value in chosen.items():
         if key not in fields:
             raise unknown(f"parameter of {name}", key, [*fields, *(["preset"] if presets else [])])
-        kind = fields[key][0]
+        kind = fields[key].kind
         try:
             values[key] = _converter().structure(value, kind)
         except Exception:  # whatever a converter raises for a value that is not of its type
@@ -218,7 +335,7 @@ def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
     if missing:
         raise UserError(f"{name}: {', '.join(missing)} must be given, as {name}[{missing[0]}=VALUE]")
     try:
-        return cls(**values)
+        return cls(**_grouped(cls, values))
     except Exception as error:
         raise UserError(f"{name}: {first_line(error)}") from error
 
@@ -233,8 +350,11 @@ def values_of(instance: object) -> dict[str, Value]:
         it could be neither stored nor told from others.
     """
     values: dict[str, Value] = {}
-    for key in parameters(type(instance)):
+    for key, (kind, _) in _arguments(type(instance)).items():
         value = getattr(instance, key, _MISSING)
+        if is_group(kind) and isinstance(value, kind):
+            values |= values_of(value)
+            continue
         if not (value is None or isinstance(value, bool | int | float | str)):
             kept = "it is not kept" if value is _MISSING else f"it is kept as {type(value).__name__}"
             raise UserError(
@@ -251,7 +371,7 @@ _MISSING = object()
 def changed(instance: object, preset: str | None = None) -> dict[str, Value]:
     """Only those parameters that differ from their defaults, or the preset's name and what differs from it."""
     cls = type(instance)
-    base = {key: default for key, (_, default) in parameters(cls).items()}
+    base = {key: one.default for key, one in parameters(cls).items()}
     named: dict[str, Value] = {} if preset is None else {"preset": preset}
     base |= presets_of(cls)[preset] if preset is not None else {}
     return named | {key: value for key, value in values_of(instance).items() if value != base[key]}

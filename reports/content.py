@@ -61,6 +61,8 @@ class Report:
         Cell -> name -> one number for each pass, such as energies; None for a number that is not finite.
     parameters
         Method, as `cells` names it by algorithm and params -> every parameter with its value.
+    groups
+        Algorithm -> parameter -> the group that it is shown in, where it has one.
     rows
         The image rows of the epipolar slices; empty if none were asked for.
     """
@@ -79,6 +81,7 @@ class Report:
     volumes: Volumes = _no_volume
     histories: Mapping[Key, History] = field(factory=dict)
     parameters: Mapping[tuple[str, str], Mapping[str, Value]] = field(factory=dict)
+    groups: Mapping[str, Mapping[str, str]] = field(factory=dict)
     rows: Sequence[int] = ()
 
     def disparity(self, algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:

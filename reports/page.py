@@ -2,6 +2,7 @@
 
 import re
 from base64 import b64encode
+from collections.abc import Mapping
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -21,6 +22,7 @@ from matbench.reports.content import Report
 from matbench.reports.numbers import COSTS, Numbers
 from matbench.reports.pictures import gallery
 from matbench.reports.tables import METRIC, REGION, Shared
+from matbench.spec import Value
 
 __all__ = ["Report", "render", "write_page"]
 if TYPE_CHECKING:
@@ -195,13 +197,21 @@ def _methods(report: Report) -> list[dict[str, Any]]:
                 "method": str(method),
                 "algorithm": names[0],
                 "params": names[1],
-                "all": [(name, str(value)) for name, value in report.parameters.get(names, {}).items()],
+                "all": _by_group(report.parameters.get(names, {}), report.groups.get(names[0], {})),
                 "ok": f"{len(ok)} of {len(rows)}",
                 "seconds": tables.text(ok["seconds"].astype(float).sum(min_count=1), "s"),
                 "peak": "–" if pd.isna(peak) else f"{peak:.0f}",
             }
         )
     return out
+
+
+def _by_group(parameters: Mapping[str, Value], groups: Mapping[str, str]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Group in words -> its parameters with their values; those of no group first."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for name, value in sorted(parameters.items(), key=lambda item: item[0] in groups):
+        found.setdefault(groups.get(name, "").replace("_", " "), []).append((name, str(value)))
+    return list(found.items())
 
 
 def _records(frame: pd.DataFrame, columns: tuple[str, ...]) -> list[list[str]]:

@@ -29,6 +29,8 @@ def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str
         (["-a", "sgmb"], "unknown algorithm 'sgmb': did you mean 'sgbm'?"),
         (["-a", "sgbm[fil=no]"], "unknown parameter 'fil' of sgbm: did you mean 'fill'?"),
         (["-a", "sgbm[fill=maybe]"], "sgbm: fill=maybe is not true or false"),
+        (["-a", "sgbm[speckle_window=0 speckle_range=3]"], "speckle_range=3 changes nothing here: it takes speckle_w"),
+        (["-a", "materiality[count=0.3]"], "materiality: count=0.3 changes nothing here: it takes optimiser=gradient"),
         (["-a", "sgbm["], "cannot read 'sgbm['"),
         (["-s", "middelbury2003/teddy"], "unknown dataset 'middelbury2003': did you mean 'middlebury2003'?"),
         (["-s", "synthetic/bx"], "unknown"),
@@ -121,6 +123,11 @@ def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
     )
     assert known["algorithms"]["flat"]["parameters"] == {"value": {"type": "a number", "default": 1.0}}
     assert "paper" in known["algorithms"]["materiality"]["presets"]
+    grouped = {name: one["group"] for name, one in known["algorithms"]["materiality"]["parameters"].items()}
+    assert set(grouped.values()) == {"matching", "inference", "solver", "energy"}
+    assert (grouped["pairs"], grouped["mending"], grouped["passes"], grouped["count"]) == tuple(
+        dict.fromkeys(grouped.values())
+    )
     assert known["scenes"]["middlebury2003/teddy"]["sizes"]["quarter"] == [450, 375]
     assert known["scenes"]["synthetic/box"]["present"] is True
     truths = {name: known["scenes"][f"middlebury2005/{name}"]["truth"] for name in ("Art", "Computer", "Drumsticks")}
@@ -129,6 +136,9 @@ def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = run(capsys, "list")
     assert status == 0
     assert all(word in out for word in ("materiality", "preset=paper", "middlebury2003/teddy", "total_bad_1"))
+    lines = [line.strip("│ ") for line in out.splitlines()]
+    energy = lines.index("energy:")
+    assert lines[energy + 1] == "count=0.3: a number"
 
 
 PLUGINS = """\

@@ -4,12 +4,25 @@ from dataclasses import dataclass
 from typing import Literal
 
 import pytest
-from attrs import field, frozen, validators
+from attrs import evolve, field, frozen, validators
 from hypothesis import given
 from hypothesis import strategies as st
 
 from matbench.errors import UserError
-from matbench.spec import Spec, build, changed, expand, parameters, parse, text, values_of
+from matbench.spec import (
+    Parameter,
+    Spec,
+    build,
+    changed,
+    expand,
+    flat,
+    parameters,
+    parse,
+    refuse_silent,
+    required,
+    text,
+    values_of,
+)
 
 
 @frozen
@@ -175,3 +188,106 @@ def test_an_annotation_that_names_nothing_is_said() -> None:
 
     with pytest.raises(UserError, match="cannot be read"):
         parameters(Odd)
+
+
+@frozen
+class Cost:
+    window: int = field(default=5, validator=validators.ge(1))
+    sigma: float = 2.5
+
+
+@frozen
+class Search:
+    cost: Cost = field(factory=Cost)
+    passes: int = 3
+
+
+@flat
+@frozen
+class Grouped:
+    fill: bool = True
+    search: Search = Search(passes=4)
+
+    presets = {"paper": {"window": 3, "passes": 9}}  # noqa: RUF012
+
+    @property
+    def silent(self) -> dict[str, str]:
+        return {} if self.search.passes else {"sigma": "passes above 0", "fill": "passes above 0"}
+
+
+def test_the_fields_of_a_group_are_parameters_under_their_own_names() -> None:
+    assert parameters(Grouped) == {
+        "fill": Parameter(bool, True),
+        "window": Parameter(int, 5, "search"),
+        "sigma": Parameter(float, 2.5, "search"),
+        "passes": Parameter(int, 4, "search"),
+    }
+    made = build("grouped", Grouped, {"sigma": "1", "fill": "no"})
+    assert made == Grouped(False, Search(Cost(sigma=1.0), passes=4))
+    assert values_of(made) == {"fill": False, "window": 5, "sigma": 1.0, "passes": 4}
+    assert build("grouped", Grouped, values_of(made)) == made
+    assert text(changed(made)) == "fill=false sigma=1.0"
+    from_preset = build("grouped", Grouped, {"preset": "paper", "passes": "4"})
+    assert text(changed(from_preset, "paper")) == "preset=paper passes=4"
+    with pytest.raises(UserError, match="grouped: 'window' must be >= 1: 0"):
+        build("grouped", Grouped, {"window": "0"})
+    with pytest.raises(UserError, match="unknown parameter 'search' of grouped"):
+        build("grouped", Grouped, {"search": "1"})
+
+
+def test_a_group_of_a_plain_class_needs_nothing_else() -> None:
+    class Plain:
+        def __init__(self, cost: Cost, share: float = 0.5) -> None:
+            self.cost, self.share = cost, share
+
+    assert required(Plain) == []
+    assert build("plain", Plain, {"window": "7"}).cost == Cost(7)
+    assert values_of(build("plain", Plain, {})) == {"window": 5, "sigma": 2.5, "share": 0.5}
+
+
+def test_python_takes_flat_names_too() -> None:
+    made = Grouped(window=7)  # type: ignore[call-arg]
+    assert made == Grouped(search=Search(Cost(7), 4))
+    assert evolve(made, sigma=1.0, fill=False) == Grouped(False, Search(Cost(7, 1.0), 4))
+    assert Grouped(search=Search(Cost(7)), passes=2) == Grouped(search=Search(Cost(7), 2))  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="windw"):
+        Grouped(windw=7)  # type: ignore[call-arg]
+
+
+def test_two_parameters_of_one_name_are_refused() -> None:
+    @frozen
+    class Other:
+        sigma: int = 3
+
+    @frozen
+    class Twice:
+        cost: Cost = field(factory=Cost)
+        other: Other = field(factory=Other)
+
+    @frozen
+    class Named:
+        sigma: Cost = field(factory=Cost)
+
+    for cls in (Twice, Named):
+        with pytest.raises(UserError, match=r"parameter 'sigma' of group .* has the name of another"):
+            parameters(cls)
+
+
+def test_a_parameter_that_changes_nothing_is_refused_where_it_is_set() -> None:
+    with pytest.raises(ValueError, match=r"sigma=1\.0 changes nothing here: it takes passes above 0"):
+        Grouped(passes=0, sigma=1.0)  # type: ignore[call-arg]
+    still = Grouped(passes=0, sigma=2.5)  # type: ignore[call-arg]
+    assert build("grouped", Grouped, {"passes": 0, "sigma": 1.0}).search.cost.sigma == 1, "a stored run goes on"
+    refuse_silent("grouped", still, {"passes": "0", "window": "3"})
+    for option, value in [("sigma", "2.5"), ("fill", "true")]:
+        with pytest.raises(UserError, match=f"^grouped: {option}={value} changes nothing here: it takes passes above"):
+            refuse_silent("grouped", still, {"passes": "0", option: value})
+    refuse_silent("sample", Sample(), {"fill": "true"})
+
+
+def test_a_silent_that_means_something_else_is_let_be() -> None:
+    @frozen
+    class Quiet:
+        silent: bool = True
+
+    refuse_silent("quiet", Quiet(), {"silent": "true"})

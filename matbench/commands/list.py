@@ -3,6 +3,7 @@
 import inspect
 import json
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -81,8 +82,12 @@ def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
         "about": (inspect.getdoc(cls) or "").split("\n\n")[0].replace("\n", " "),
         "presets": sorted(spec.presets_of(cls)),
         "parameters": {
-            name: {"type": spec.describe(kind), "default": None if default is empty else _plain(default)}
-            for name, (kind, default) in parameters.items()
+            name: {
+                "type": spec.describe(one.kind),
+                "default": None if one.default is empty else _plain(one.default),
+            }
+            | ({"group": one.group} if one.group else {})
+            for name, one in parameters.items()
         },
     }
 
@@ -109,9 +114,10 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         if "error" in facts:
             methods.add_row(escape(name), f"[red]{escape(facts['error'])}[/]")
             continue
-        lines = [facts["about"]]
-        lines += [f"  {key}={_shown(p['default'])}: {p['type']}" for key, p in facts["parameters"].items()]
-        lines += [f"  preset={preset}" for preset in facts["presets"]]
+        lines = [facts["about"], *(f"  preset={preset}" for preset in facts["presets"])]
+        for group, members in groupby(facts["parameters"].items(), key=lambda item: item[1].get("group", "")):
+            lines += [f" {group.replace('_', ' ')}:"] if group else []
+            lines += [f"  {key}={_shown(one['default'])}: {one['type']}" for key, one in members]
         methods.add_row(escape(name), escape("\n".join(lines)))
     scenes = Table(
         Column("scene", no_wrap=True),

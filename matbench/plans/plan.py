@@ -122,7 +122,8 @@ def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[
     Raises
     ------
     UserError
-        For an unknown method or parameter, or a value that it does not take.
+        For an unknown method or parameter, a value that it does not take, or one that changes nothing
+        beside the others.
     """
     found: dict[str, Method] = {}
     for one in spec.expand(selectors):
@@ -130,6 +131,7 @@ def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[
         instance = spec.build(plugin.name, plugin.load(), one.options)
         if not callable(getattr(instance, "solve", None)):
             raise UserError(f"{plugin.name} from {plugin.source} is no method: it has no solve(scene, context)")
+        spec.refuse_silent(plugin.name, instance, one.options)
         preset = one.options.get("preset") if "preset" not in spec.parameters(type(instance)) else None
         changed = spec.text(spec.changed(instance, preset))
         params = spec.values_of(instance)

@@ -7,10 +7,10 @@ import pytest
 from attrs import evolve
 
 from matbench.algorithm import Context, Probe
+from matbench.algorithms.inference import Inference
 from matbench.algorithms.materiality import Materiality
 from matbench.algorithms.materiality.consensus import consensus
 from matbench.algorithms.multiview_sgm import MultiviewSGM
-from matbench.algorithms.readings import Readings
 from matbench.algorithms.similarity import Matcher
 from matbench.datasets.synthetic import SYNTHETIC
 from matbench.space import visibility
@@ -54,15 +54,15 @@ def test_estimate_is_complete():
 
 
 @pytest.mark.parametrize("passes", [0, 2])
-def test_a_pass_reads_all_views_by_what_the_last_maps_say(passes):
+def test_a_pass_infers_all_maps_by_what_the_last_ones_say(passes):
     scene = box(ref="1")
     method = Materiality(passes=passes)
     estimate = method.solve(scene, Context())
-    matcher, reader = Matcher.of(scene, method), Readings()
+    matcher, inference = Matcher.of(scene, method.matching), Inference()
     history = {"changed": [], "energy_before": [], "energy": []}
-    maps = reader.first(matcher)
+    maps = inference.initial_maps(matcher)
     for _ in range(passes):
-        found, before, after = reader.again(matcher, maps, method.material)
+        found, before, after = inference.refined_maps(matcher, maps, method.solver.material)
         for name, value in zip(history, (np.mean(np.abs(found - maps) > 0.5), before, after), strict=True):
             history[name].append(value)
         maps = found

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from matbench.algorithms.fusion import Fusion, better_half, seen_from, support
+from matbench.algorithms.fusion import Fusion, better_half, support
 from matbench.algorithms.similarity import Matcher, Matching
 from matbench.scene import Range, Scene
 
@@ -142,7 +142,7 @@ def test_seen_cost_is_its_equation(n, height, width, least, extent, fineness, wh
         n, height, width, least, least + extent, seed, pairs=which, fineness=fineness, window=window
     )
     view = seed % n
-    matcher = seen_from(matcher, view)
+    matcher = matcher.with_reference(view)
     space, rng = matcher.space, np.random.default_rng(seed)
     maps = (rng.random((n, space.rows, space.width)) * (space.planes - 1)).astype(np.float32)
     maps = np.where(rng.random(maps.shape) < 0.3, np.rint(maps), maps)
@@ -203,8 +203,8 @@ def test_a_view_that_ends_before_a_point_says_nothing_about_it():
 
 
 @pytest.mark.parametrize("view", [0, 3])
-def test_seen_from_another_view_that_view_is_in_every_pair(view):
-    matcher = seen_from(random_matcher(4), view)
+def test_another_reference_view_is_in_every_pair(view):
+    matcher = random_matcher(4).with_reference(view)
     assert matcher.scene.ref == view
     assert len(matcher.pairs) == 3
     assert (matcher.pairs == view).any(axis=1).all()

@@ -42,7 +42,7 @@ def test_estimate_is_complete():
         estimate.history["total"], np.add(estimate.history["data"], estimate.history["smooth"]), rtol=1e-9
     )
     passes = estimate.work["passes"]
-    assert passes == FISTA.passes
+    assert passes == FISTA.solver.passes
     assert estimate.work["point_updates"] == passes * values.size
     assert estimate.work["pair_similarities"] > 0
 
@@ -115,7 +115,7 @@ def test_it_stops_when_a_pass_gains_little():
 @pytest.mark.parametrize("name", ["paper", "descent"])
 def test_presets_descend(name):
     method = Materiality(**Materiality.presets[name])
-    assert method.optimiser in ("gradient", "fista")
+    assert method.solver.optimiser in ("gradient", "fista")
     assert "total" in method.solve(box(), Context()).history
 
 
@@ -152,7 +152,7 @@ def test_presets_descend(name):
 )
 def test_every_switch_changes_something(change):
     reading = {"binarization", "hidden", "material", "small_step", "large_step", "contrast"}
-    # the soft start needs no reader
+    # the soft start infers no maps
     base = evolve(FISTA, start="soft" if set(change) <= reading | {"start", "sharpness"} else "consensus")
     if change == {"start": "soft"}:
         base = FISTA

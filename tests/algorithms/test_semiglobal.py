@@ -92,11 +92,11 @@ def twin_energy(cost, image, planes, small, large, edge):
 @given(problem=problems(), seed=st.integers(0, 99))
 def test_energy_is_its_twin(problem, seed):
     cost, image = problem
-    reader, rng = SemiGlobal(small_step=0.1, large_step=0.7, contrast=20.0), np.random.default_rng(seed)
+    semiglobal, rng = SemiGlobal(small_step=0.1, large_step=0.7, contrast=20.0), np.random.default_rng(seed)
     planes = rng.uniform(0, cost.shape[2] - 1, cost.shape[:2]).astype(np.float32)
     planes[rng.random(planes.shape) < 0.1] = np.nan
     expected = twin_energy(cost, image, planes, 0.1, 0.7, 20.0)
-    np.testing.assert_allclose(reader.energy(cost, image, planes), expected, rtol=1e-5)
+    np.testing.assert_allclose(semiglobal.energy(cost, image, planes), expected, rtol=1e-5)
 
 
 def test_threads_change_nothing():
@@ -110,7 +110,7 @@ def test_unknown_pixels_answer_nothing_and_pass_messages_on():
     cost = np.ones((3, 9, 5), np.float32)
     cost[..., 2] = 0
     cost[:, 4] = np.nan
-    found = SemiGlobal().read(cost, np.zeros((3, 9, 3), np.uint8))
+    found = SemiGlobal().infer(cost, np.zeros((3, 9, 3), np.uint8))
     assert np.isnan(found[:, 4]).all()
     np.testing.assert_array_equal(found[:, [0, 3, 5, 8]], 2)
 
@@ -120,8 +120,8 @@ def test_fit_lies_between_planes():
     cost = np.broadcast_to(np.abs(planes - 4.3), (4, 4, 9)).astype(np.float32)
     image = np.zeros((4, 4, 3), np.uint8)
     # neighbours pull a little towards the plane they agree on
-    np.testing.assert_allclose(SemiGlobal().read(cost, image), 4.3, atol=0.1)
-    np.testing.assert_allclose(SemiGlobal(small_step=0, large_step=0).read(cost, image), 4.3, atol=1e-3)
+    np.testing.assert_allclose(SemiGlobal().infer(cost, image), 4.3, atol=0.1)
+    np.testing.assert_allclose(SemiGlobal(small_step=0, large_step=0).infer(cost, image), 4.3, atol=1e-3)
 
 
 def test_penalties_fall_with_contrast_to_the_small_step():

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from matbench.algorithms.features import alike
+from matbench.algorithms.features import same_surface
 from matbench.algorithms.sampling import fine_rows
 from matbench.algorithms.similarity import Matcher, Matching, pairs
 from matbench.scene import Range, Scene
@@ -34,7 +34,7 @@ def darker(grey, y, sample, q):
     return around(grey, y, sample, q) < grey[y, sample]
 
 
-def same_surface(rows, y, sample, q, most):
+def like_middle(rows, y, sample, q, most):
     """Which of the 7x7 pixels are next to the middle, or within `most` grey levels of it in every channel."""
     like = (np.abs(around(rows, y, sample, q) - rows[:, y, sample, None, None]) <= most).all(axis=0)
     like[2:5, 2:5] = True
@@ -75,7 +75,7 @@ def twin(matcher: Matcher) -> np.ndarray:
                         continue
                     at = (i, ui + dx), (j, uj + dx)
                     order = [darker(grey[v], y + dy, u, q) for v, u in at]
-                    like = [same_surface(rows[v], y + dy, u, q, how.alike) for v, u in at] if how.alike else None
+                    like = [like_middle(rows[v], y + dy, u, q, how.alike) for v, u in at] if how.alike else None
                     cost = min(differing(order, like), 20) / 20
                     if how.similarity == "mixed":
                         slopes = [slope(grey[v, y + dy], u, q) for v, u in at]
@@ -140,12 +140,12 @@ def test_similarity_is_its_equation(
     most=st.sampled_from([1.0, 2.0, 4.0]),
     seed=st.integers(0, 99),
 )
-def test_alike_is_what_is_near_or_of_a_colour(shape, fineness, most, seed):
+def test_same_surface_is_what_is_near_or_of_a_colour(shape, fineness, most, seed):
     rows = np.random.default_rng(seed).integers(-3, 4, shape).astype(np.float32)
-    bits = alike(rows, fineness, most)
+    bits = same_surface(rows, fineness, most)
     assert bits.shape == (shape[0], 3, *shape[2:])
     for view, y, x in np.ndindex(shape[0], *shape[2:]):
-        like = np.delete(same_surface(rows[view], y, x, fineness, most).ravel(), 24)
+        like = np.delete(like_middle(rows[view], y, x, fineness, most).ravel(), 24)
         assert "".join(f"{word:016b}" for word in bits[view, :, y, x]) == "".join(map(str, like.astype(int)))
 
 

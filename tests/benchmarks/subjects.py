@@ -63,7 +63,8 @@ def _large() -> Scene:
 
 @cache
 def _matcher(name: str = "multiview_sgm") -> Any:
-    return _of("similarity", "Matcher").of(_large(), instance(name))
+    one = instance(name)
+    return _of("similarity", "Matcher").of(_large(), getattr(one, "matching", one))  # in older code, itself
 
 
 def _rays() -> NDArray[np.uint8]:
@@ -80,7 +81,7 @@ def _maps() -> NDArray[np.float32]:
 
 @cache
 def _cost() -> NDArray[np.float32]:
-    cost: NDArray[np.float32] = instance("multiview_sgm").first_cost(_matcher())
+    cost: NDArray[np.float32] = _of("fusion", "Fusion")().first_cost(_matcher())
     return cost
 
 
@@ -137,8 +138,8 @@ def census() -> Work:
     return partial(_of("features", "census"), _of("features", "luma")(_matcher().rows), 1)
 
 
-def alike() -> Work:
-    return partial(_of("features", "alike"), _matcher().rows, 1, 10.0)
+def same_surface() -> Work:
+    return partial(_of("features", "same_surface"), _matcher().rows, 1, 10.0)
 
 
 def _started(name: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
@@ -208,7 +209,7 @@ KERNELS: Mapping[str, Callable[[], Work]] = {
     "winner": winner,
     "mending": mending,
     "census": census,
-    "alike": alike,
+    "same surface": same_surface,
     "passes": passes,
     "tied pass": tied_pass,
     "soft start": soft_start,

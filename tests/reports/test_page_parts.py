@@ -1,5 +1,6 @@
 """What the page is made of: maps that can be read back, slices, spreads of errors, standings."""
 
+import re
 from base64 import b64decode
 
 import cv2
@@ -228,3 +229,21 @@ def test_energies_are_drawn_relative_to_their_first_pass(report: Report) -> None
     assert passes.lines(told, scope) == [["good", "total", "2", "3", "-50.0"]]
     assert "No method told" in page.render(report)
     assert "No method told" not in page.render(told)
+
+
+def test_parameters_stand_in_their_groups(report: Report) -> None:
+    names = str(report.cells["algorithm"].iloc[0]), str(report.cells["params"].fillna("").iloc[0])
+    one = evolve(
+        report,
+        parameters={names: {"passes": 1, "window": 5, "fill": True}},
+        groups={names[0]: {"passes": "fixed_point", "window": "matching"}},
+    )
+    told = page.render(one).partition("<summary>all parameters</summary>")[2].partition("</details>")[0]
+    assert re.sub("</?(p|code)>", "", told).split() == [
+        "fill=True",
+        "fixed",
+        "point:",
+        "passes=1",
+        "matching:",
+        "window=5",
+    ]

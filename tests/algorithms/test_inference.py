@@ -1,11 +1,12 @@
-"""Maps of all views: each is read with its own cost, and all are mended together."""
+"""Maps of all views: each is inferred from costs on its own rays, and all are mended together."""
 
 import numpy as np
 import pytest
 
-from matbench.algorithms.fusion import Fusion, seen_from
+from matbench.algorithms.fusion import Fusion
+from matbench.algorithms.inference import Inference
 from matbench.algorithms.mending import mend
-from matbench.algorithms.readings import Readings
+from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import Matcher, Matching
 from matbench.scene import Range, Scene
 
@@ -30,25 +31,27 @@ def mended(matcher, maps, rounds):
 
 @pytest.mark.parametrize("rounds", [0, 2])
 @pytest.mark.parametrize(("fineness", "pair_steps"), [(1, 1.0), (2, 1.0), (2, 3.0)])
-def test_every_view_is_read_by_the_cost_on_its_own_rays(fineness, pair_steps, rounds):
+def test_every_view_is_inferred_from_costs_on_its_own_rays(fineness, pair_steps, rounds):
     matcher = moving_plane(fineness=fineness, pair_steps=pair_steps, noise=80, window=3)
-    reader, scene = Readings(mending=rounds, large_step=0.5), matcher.scene
-    first = [reader.read(Fusion().first_cost(seen_from(matcher, view)), scene.views[view]) for view in range(scene.n)]
+    semiglobal, scene = SemiGlobal(large_step=0.5), matcher.scene
+    inference = Inference(semiglobal=semiglobal, mending=rounds)
+    views = [matcher.with_reference(view) for view in range(scene.n)]
+    first = [semiglobal.infer(Fusion().first_cost(one), scene.views[view]) for view, one in enumerate(views)]
     expected = mended(matcher, np.stack(first), rounds)
     for threads in (1, 2):
-        maps = reader.first(matcher, threads)
+        maps = inference.initial_maps(matcher, threads)
         np.testing.assert_allclose(maps, expected, atol=1e-5)
         assert maps.dtype == np.float32
 
     second, energies = [], []
-    for view in range(scene.n):
-        cost, mu = Fusion().seen_cost(seen_from(matcher, view), maps)
+    for view, one in enumerate(views):
+        cost, mu = Fusion().seen_cost(one, maps)
         cost += np.float32(0.4) * (1 - mu)
-        second.append(reader.read(cost, scene.views[view]))
-        energies.append([reader.energy(cost, scene.views[view], planes) for planes in (maps[view], second[-1])])
+        second.append(semiglobal.infer(cost, scene.views[view]))
+        energies.append([semiglobal.energy(cost, scene.views[view], planes) for planes in (maps[view], second[-1])])
     expected = mended(matcher, np.stack(second), rounds)
     for threads in (1, 2):
-        again, *told = reader.again(matcher, maps, 0.4, threads)
+        again, *told = inference.refined_maps(matcher, maps, 0.4, threads)
         np.testing.assert_allclose(again, expected, atol=1e-5)
         np.testing.assert_allclose(told, np.mean(energies, axis=0), rtol=1e-5)
 
@@ -56,20 +59,20 @@ def test_every_view_is_read_by_the_cost_on_its_own_rays(fineness, pair_steps, ro
 @pytest.mark.parametrize("disparity", [-1, 0, 1, 2])
 def test_a_plane_is_found_in_every_view(disparity):
     matcher = moving_plane(disparity=disparity, least=-2)
-    maps = Readings().first(matcher)
-    again, *_ = Readings().again(matcher, maps, 0.25)
+    maps = Inference().initial_maps(matcher)
+    again, *_ = Inference().refined_maps(matcher, maps, 0.25)
     for planes in (maps, again):
         assert (np.abs(matcher.disparity(planes) - disparity) < 0.5).mean() > 0.97
 
 
 def test_maps_that_are_given_stay_as_they_are():
     matcher = moving_plane()
-    maps = Readings().first(matcher)
+    maps = Inference().initial_maps(matcher)
     before = maps.copy()
-    Readings().again(matcher, maps, 0.25)
+    Inference().refined_maps(matcher, maps, 0.25)
     np.testing.assert_array_equal(maps, before)
 
 
 def test_a_wrong_value_names_the_parameter():
     with pytest.raises(ValueError, match="mending"):
-        Readings(mending=-1)
+        Inference(mending=-1)

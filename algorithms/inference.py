@@ -1,0 +1,95 @@
+"""Maps of all views of a scene, inferred semi-globally and made to agree: what materiality and its control share."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from attrs import field, frozen, validators
+from numpy.typing import NDArray
+
+from matbench.algorithms.fusion import Fusion
+from matbench.algorithms.mending import mend
+from matbench.algorithms.semiglobal import SemiGlobal
+from matbench.algorithms.similarity import Matcher, Matching
+from matbench.algorithms.windows import Features
+
+
+@frozen
+class Inference:
+    """How disparities are inferred from similarities. A group of parameters, those of `Fusion` and `SemiGlobal` in it.
+
+    Parameters
+    ----------
+    mending
+        Rounds in which what other views contradict is replaced by what trusted neighbours of its
+        colour say (`mend`); 0 = none.
+    """
+
+    fusion: Fusion = field(factory=Fusion)
+    semiglobal: SemiGlobal = field(factory=SemiGlobal)
+    mending: int = field(default=3, validator=validators.ge(0))
+
+    def silent(self, matching: Matching) -> Mapping[str, str]:
+        """The parameters that are not read with windows of this size -> what they take to be read."""
+        return {"adaptive": "window above 1"} if matching.window == 1 else {}
+
+    @staticmethod
+    def volume_bytes(matcher: Matcher, refined: bool) -> int:
+        """Bytes of the volumes held at once: costs, sums of either sweep, and for `refined` maps materialities."""
+        return (4 if refined else 3) * matcher.ray_bytes
+
+    @staticmethod
+    def comparisons(matcher: Matcher) -> int:
+        """How many pairs of windows the maps of all views take."""
+        return sum(matcher.with_reference(view).ray_comparisons for view in range(matcher.space.views))
+
+    def initial_maps(self, matcher: Matcher, threads: int = 1) -> NDArray[np.float32]:
+        """(views, H, W) maps by the better half of the similarities of each point, as planes of the space; mended."""
+
+        def cost(one: Matcher, phases: Features) -> NDArray[np.float32]:
+            return self.fusion.first_cost(one, threads, phases)
+
+        return self._maps(matcher, cost, threads)[0]
+
+    def refined_maps(
+        self, matcher: Matcher, maps: NDArray[np.float32], material: float, threads: int = 1
+    ) -> tuple[NDArray[np.float32], float, float]:
+        """The same by the pairs that see a point, if the rays of all views end where `maps` say.
+
+        The cost of a point is that of `Fusion.seen_cost`, plus material (1 - mu).
+
+        Returns
+        -------
+        The new maps, and the energies (`SemiGlobal.energy`, mean over the views) under these costs of `maps`
+        and of the new maps before they are mended.
+        """
+
+        def cost(one: Matcher, phases: Features) -> NDArray[np.float32]:
+            least, mu = self.fusion.seen_cost(one, maps, threads, phases)
+            np.subtract(1, mu, out=mu)
+            mu *= np.float32(material)
+            return np.add(least, mu, out=least)
+
+        found, energies = self._maps(matcher, cost, threads, maps)
+        before, after = energies.mean(axis=0)
+        return found, float(before), float(after)
+
+    def _maps(
+        self,
+        matcher: Matcher,
+        cost: Callable[[Matcher, Features], NDArray[np.float32]],
+        threads: int,
+        known: NDArray[np.float32] | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Mended maps of all views, and for each view the energies of the `known` map and of the new one."""
+        space, scene, phases = matcher.space, matcher.scene, matcher.phases()
+        maps = np.empty((space.views, space.rows, space.width), np.float32)
+        energies = np.zeros((space.views, 2))
+        for view, image in enumerate(scene.views):
+            paid = cost(matcher.with_reference(view), phases)
+            maps[view] = self.semiglobal.infer(paid, image, threads)
+            if known is not None:
+                energies[view] = [self.semiglobal.energy(paid, image, of) for of in (known[view], maps[view])]
+        steps = (maps + np.float32(space.first)) / np.float32(space.fineness)
+        mended = mend(steps, scene.views, 1 / scene.pair_steps, self.mending, threads)
+        planes = np.asarray(mended * np.float32(space.fineness) - np.float32(space.first), np.float32)
+        return planes, energies
