@@ -23,7 +23,7 @@ _PATIENCE = 600  # seconds that another process has to read a scene
 
 
 def without_truth(scene: Scene) -> Scene:
-    """The scene as a method may see it: no ground truth and nothing that follows from it, no view held out."""
+    """The scene as a method may see it: without ground truth, regions, visibility and the held-out view."""
     return evolve(scene, truth={}, regions={}, visible={}, held_out=None)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from matbench.scene import Range, Scene
 from matbench.scenes.catalogue import load_scene
-from matbench.solving.worker import hide_truth
+from matbench.scenes.views_only import without_truth
 
 EASY, EITHER_SIGN = "synthetic/box[n=5 ref=1]", "synthetic/curved[n=5 ref=1]"
 """Textured scenes of 240x180 px.
@@ -73,7 +73,7 @@ def _small(shape: tuple[int, int], disparities: Range, value: int | None = None)
 @cache
 def trials() -> Mapping[str, Trial]:
     """All trials, by name."""
-    easy, either = (hide_truth(load_scene(name)) for name in (EASY, EITHER_SIGN))
+    easy, either = (without_truth(load_scene(name)) for name in (EASY, EITHER_SIGN))
     scenes = {
         "easy": easy,
         "easy again": easy,

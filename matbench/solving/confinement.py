@@ -7,7 +7,9 @@ confined and `shut_in` says so; what a method then rewrites is found out by dige
 import ctypes
 import os
 import sys
+import tempfile
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 _NEWNS, _NEWUSER = 0x00020000, 0x10000000  # unshare(2)
@@ -46,12 +48,24 @@ def shut_in(read_only: Path, shared_mb: int) -> bool:
     return mount(None, folder, None, _BIND | _REMOUNT | _RDONLY, None)
 
 
-def shared_memory_mb(pid: int) -> float:
-    """MiB that files in the shared memory of a process hold, where it has one of its own; else 0."""
+@cache
+def is_possible() -> bool:
+    """Can a process on this system be shut in? A process that ends at once has tried it."""
+    with tempfile.TemporaryDirectory(prefix="matbench-") as folder:
+        pid = os.fork()
+        if not pid:
+            try:
+                os._exit(0 if shut_in(Path(folder), 1) else 1)
+            finally:
+                os._exit(1)
+        return os.waitpid(pid, 0)[1] == 0
+
+
+def shared_memory_mb(pid: int) -> float | None:
+    """MiB that files in the shared memory of a process hold, where it has one of its own; else None."""
     with suppress(OSError):
         inside = Path("/proc", str(pid), "root" + SHARED_MEMORY)
-        here = Path(SHARED_MEMORY)
-        if inside.stat().st_dev != here.stat().st_dev:
+        if inside.stat().st_dev != Path(SHARED_MEMORY).stat().st_dev:
             found = os.statvfs(inside)
             return (found.f_blocks - found.f_bfree) * found.f_frsize / 2**20
-    return 0.0
+    return None
