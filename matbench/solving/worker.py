@@ -99,8 +99,11 @@ class KeeperLine:
     """The line to the keeper, which counts from outside: it takes the time between ``begins`` and ``ends``."""
 
     line: Connection
+    process: int = field(factory=os.getpid)
 
     def say(self, message: Message) -> None:
+        if os.getpid() != self.process:  # the method has forked and both returned: only the original goes on
+            os._exit(1)
         os.write(self.line.fileno(), json.dumps(_json.unstructure(message)).encode() + b"\n")
 
     def say_and_wait(self, word: Literal["begins", "ends"]) -> None:
@@ -245,8 +248,6 @@ def run_cell(order: Order, keeper: KeeperLine) -> Outcome:
             raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
         scene = views_only.read(order.views)
         answer = _solve(method, scene, job, keeper)
-        if os.getpid() != process:  # the method has forked and both returned: only the original goes on
-            os._exit(1)
         # `evolve` makes a scene whose digest is not cached: it is computed from the pixels as they are now
         if evolve(scene).digest != cell.scene_digest:
             raise ValueError("the method wrote into its input")
