@@ -128,6 +128,7 @@ def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Pat
             for ours in (line, answers):
                 ours.close()
             memory.confine(limits.room())
+            memory.fill_fresh(trial.garbage)
             own, found = os.getpid(), solve_here(method, files, trial, log)
             if os.getpid() == own:  # else this is a copy that the method has forked, and not the one to answer
                 theirs.send(found)
