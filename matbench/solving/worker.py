@@ -122,12 +122,12 @@ class Answer:
 
 
 def like(scene: Scene, size: tuple[int, int]) -> Scene:
-    """A scene of noise with the views, types and range of another, of so many rows and columns.
+    """A scene of noise with the name, views, types and range of another, of so many rows and columns.
 
     Methods are compiled on it: they never see the scene that is timed before its time.
     """
     views = np.random.default_rng(0).integers(0, 256, (scene.n, *size, 3), np.uint8)
-    return evolve(scene, name="warm-up", views=views)
+    return evolve(scene, views=views)
 
 
 def checked(estimate: Any, scene: Scene) -> dict[int, NDArray[np.float32]]:
