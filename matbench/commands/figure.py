@@ -81,7 +81,8 @@ def slice_(
     from matbench.recording.probe import CapturingProbe
     from matbench.reports import slice_figure
     from matbench.runs.store import Store
-    from matbench.solving.worker import checked, hide_truth
+    from matbench.scenes.views_only import without_truth
+    from matbench.solving.worker import checked
 
     store, console = Store(run), Console()
     plan = store.plan()
@@ -106,7 +107,7 @@ def slice_(
         raise UserError(f"{chosen} was skipped: {reason}")
     probe = CapturingProbe(wanted.at(scene.height))
     with console.status(f"{chosen}: solving once more"):
-        hidden = hide_truth(scene)
+        hidden = without_truth(scene)
         estimate = method.solve(hidden, Context(chosen.seed, cores(), probe))
         answer = checked(estimate, hidden)
     plane = slice_figure.epipolar_plane(scene, probe, estimate)

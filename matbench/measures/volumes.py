@@ -49,6 +49,8 @@ class StoredVolume:
         ValueError
             If it holds anything but numbers from 0 to 1.
         """
+        if np.ma.is_masked(volume.values):
+            raise ValueError("the volume has masked points, which are no numbers")
         levels = np.empty(volume.values.shape, np.uint8)
         for row, values in zip(levels, volume.values, strict=True):
             if not ((values >= -_ROUNDING) & (values <= 1 + _ROUNDING)).all():

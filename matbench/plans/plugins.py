@@ -193,6 +193,13 @@ def method_digest(plugin: Plugin, instance: object) -> str:
     return digest.hexdigest()
 
 
+def unsupported(method: object, scene: object) -> str:
+    """Why a method does not support a scene, in its own words; empty if it does."""
+    ask = getattr(method, "unsupported_reason", None)
+    reason = ask(scene) if ask is not None else None
+    return str(reason) if reason else ""
+
+
 def _versions() -> str:
     return " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "opencv-python-headless"))
 

@@ -122,7 +122,7 @@ class CapturingProbe(Probe):
     @property
     def frames(self) -> list[PassCapture]:
         """The kept passes, at most as many as wanted, with the first and the last that was told."""
-        if self._last is None or self._last is self._frames[-1]:
+        if self._last is None or self._last.step == self._frames[-1].step:
             return list(self._frames)
         return [*self._frames[: self.wanted.passes - 1], self._last]
 

@@ -51,6 +51,7 @@ from matbench.plans.record_option import RecordOption
 from matbench.recording import blueprint
 from matbench.recording.entities import EntityLogger, contents_text
 from matbench.recording.probe import CapturingProbe
+from matbench.recording.told import Told
 from matbench.scene import Scene
 
 NOTE = "matbench"
@@ -100,9 +101,20 @@ def record(
     """
     probe = CapturingProbe(wanted.at(scene.height))
     estimate = solve(probe)
-    with staged(path) as beside:
-        verify(beside, _write(beside, scene, probe, estimate, title))
+    record_told(path, scene, Told(probe, estimate), title=title)
     return estimate
+
+
+def record_told(path: Path, scene: Scene, told: Told, *, title: str) -> None:
+    """Write a recording of what a method told and answered elsewhere, where it had not the scene's truth.
+
+    Raises
+    ------
+    RecordingError
+        If what was written cannot be read back.
+    """
+    with staged(path) as beside:
+        verify(beside, _write(beside, scene, told.probe, told.estimate, title))
 
 
 def record_scene(path: Path, scene: Scene) -> None:

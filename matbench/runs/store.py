@@ -52,6 +52,12 @@ class Outcome:
     ----------
     seconds
         Wall time of the solve alone: no imports, no compilation, no recording.
+    processor_seconds
+        Of the solve, over all processors: of the cell's process and of all that it started.
+    others_seconds
+        Processor seconds that all else on the machine took meanwhile, another machine's on the same processor included.
+    doubt
+        Why `seconds` cannot be compared, in words: others took the processors, or two clocks disagree.
     warmup_seconds
         Wall time of a first solve on a tiny scene of the same kind, compilation included.
     peak_mb
@@ -85,6 +91,9 @@ class Outcome:
     alone: bool = True
     maps: str = ""
     ran_on: Mapping[str, str] = {}
+    processor_seconds: float | None = None
+    others_seconds: float | None = None
+    doubt: str = field(default="", converter=_one_line)
 
 
 class FolderLost(UserError):
@@ -102,6 +111,29 @@ def maps_digest(maps: Mapping[int, NDArray[np.float32]]) -> str:
     for view, values in sorted(maps.items()):
         digest.update(f"{view} {values.shape};".encode() + np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()[:16]
+
+
+def read_maps(path: Path) -> dict[int, NDArray[np.float32]]:
+    """View index -> (H, W) disparity map in a file, pixels per view step.
+
+    Raises
+    ------
+    ValueError, OSError
+        If the file is missing or holds something else.
+    """
+    with path.open("rb") as file:
+        try:
+            with zipfile.ZipFile(file) as archive:
+                if sum(info.file_size for info in archive.infolist()) > _MAP_BYTES:
+                    raise ValueError(f"{path} unpacks to more than {_MAP_BYTES} bytes")
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as arrays:
+                maps = {int(name.removeprefix("view_")): arrays[name] for name in arrays.files}
+        except (zipfile.BadZipFile, EOFError, TypeError, KeyError) as error:
+            raise ValueError(f"{path} holds no disparity maps") from error
+    if not maps or any(values.ndim != 2 or values.dtype != np.float32 for values in maps.values()):
+        raise ValueError(f"{path} holds no disparity maps")
+    return maps
 
 
 def _to_disk(folder: Path) -> None:
@@ -344,17 +376,7 @@ class Store:
         ValueError, OSError
             If the file is missing or holds something else.
         """
-        path = self.cell(cell) / "disparity.npz"
-        with path.open("rb") as file:
-            with zipfile.ZipFile(file) as archive:
-                if sum(info.file_size for info in archive.infolist()) > _MAP_BYTES:
-                    raise ValueError(f"{path} unpacks to more than {_MAP_BYTES} bytes")
-            file.seek(0)
-            with np.load(file, allow_pickle=False) as arrays:
-                maps = {int(name.removeprefix("view_")): arrays[name] for name in arrays.files}
-        if not maps or any(values.ndim != 2 or values.dtype != np.float32 for values in maps.values()):
-            raise ValueError(f"{path} holds no disparity maps")
-        return maps
+        return read_maps(self.cell(cell) / "disparity.npz")
 
     def volume(self, cell: Cell) -> StoredVolume | None:
         """The stored volume, or None where there is none, or a damaged one."""
@@ -377,7 +399,8 @@ def write_cell(
     if disparity is not None:
         arrays: dict[str, Any] = {f"view_{view}": values for view, values in disparity.items()}
         np.savez_compressed(draft / "disparity.npz", **arrays)
-    outcome = evolve(outcome, maps=maps_digest(disparity) if disparity else "", ran_on=provenance.ran_on())
+    maps = maps_digest(disparity) if disparity else outcome.maps
+    outcome = evolve(outcome, maps=maps, ran_on=provenance.ran_on())
     facts = {"cell": _json.unstructure(cell), "outcome": _json.unstructure(outcome)}
     text = json.dumps(facts, indent=1, allow_nan=False)
     (draft / "cell.json").write_text(text, encoding="utf-8")

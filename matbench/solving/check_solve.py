@@ -25,7 +25,7 @@ from matbench.algorithm import Context
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import limits, plugins
 from matbench.plans.plan import Method
-from matbench.solving import processes
+from matbench.solving import memory, processes
 from matbench.solving.check_scenes import Trial
 from matbench.solving.worker import checked
 from matbench.spec import first_line
@@ -127,7 +127,8 @@ def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Pat
             processes.die_with_parent(watcher)
             for ours in (line, answers):
                 ours.close()
-            processes.confine(limits.room())
+            memory.confine(limits.room())
+            memory.fill_fresh(trial.garbage)
             own, found = os.getpid(), solve_here(method, files, trial, log)
             if os.getpid() == own:  # else this is a copy that the method has forked, and not the one to answer
                 theirs.send(found)

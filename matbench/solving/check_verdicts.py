@@ -56,6 +56,7 @@ def judge(answers: Mapping[str, Answer]) -> list[CheckResult]:
         _honest(answers),
         _leaves_input(answers),
         _same("seed", "the same seed gives the same answer", answers, "easy again"),
+        _written(answers),
         _same("threads", "any number of threads gives the same answer", answers, "easy, 3 threads"),
         _mirrored(answers),
         _quiet(answers),
@@ -105,6 +106,21 @@ def _honest(answers: Mapping[str, Answer]) -> CheckResult:
     demand = "no answer is NaN, never infinite"
     wrong = {name: "infinite" for name, found in answers.items() if found.infinite}
     return _seen("honest", demand, answers, wrong)
+
+
+def _written(answers: Mapping[str, Answer]) -> CheckResult:
+    """Of two solves whose fresh memory was filled with different garbage: pixels that differ were never written."""
+    name, demand = "written", "every pixel of a map is written, be it with NaN"
+    first, again, other = (answers[which] for which in ("easy", "easy again", "easy, other garbage"))
+    # a method that does not repeat itself differs anyway, which `seed` tells
+    if not first.maps or set(first.maps) != set(other.maps) or first.digest != again.digest:
+        return CheckResult(name, demand, "skipped", "nothing to compare")
+    if first.digest == other.digest:
+        return CheckResult(name, demand, "pass")
+    unlike = {view: int((~_agreeing(values, other.maps[view], 0)).sum()) for view, values in first.maps.items()}
+    where = ", ".join(f"{count} pixels of view {view}" for view, count in unlike.items() if count)
+    said = f"{where or 'history, work or volume'}: what they hold depends on memory that was never written"
+    return CheckResult(name, demand, "fail", said)
 
 
 def _leaves_input(answers: Mapping[str, Answer]) -> CheckResult:

@@ -1,20 +1,22 @@
 """Keepers: processes that run no method themselves but watch the process that does.
 
-For each cell a keeper forks a child process that runs the method. The keeper stores what the child
-prints, and measures its time and memory. A child that exceeds a limit is killed with all that it has
-started. The keeper owns the cell's folder, so log and outcome are written whatever the method does.
+For each cell a keeper has the scene read by a process that does nothing else, and forks a child that gets the
+scene's views only and runs the method. So truth was never in the memory of a process that runs a method. The keeper
+stores what the child prints, and measures its time and memory. A child that exceeds a limit is killed with all that
+it has started. The child writes its answer into a folder of its own; the keeper checks that and takes it in. The
+keeper owns the cell's folder, so log and outcome are written whatever the method does.
 
 A keeper is connected to the run by a pipe, its line. When the other end of the line closes, even because
 the run was killed, the keeper kills everything below it and ends. So nothing outlives a run.
 """
 
-import json
 import os
 import shutil
 import signal
 import sys
+import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection, wait
@@ -23,14 +25,17 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import define, evolve, field
 
-from matbench.runs.store import Outcome, Store, write_cell
-from matbench.solving import processes
-from matbench.solving.worker import Job, serve
+from matbench.errors import UserError
+from matbench.plans.limits import cores
+from matbench.runs.store import FINAL, Outcome, Store, maps_digest, write_cell
+from matbench.scenes import views_only
+from matbench.solving import confinement, disturbance, errand, intake, memory, processes
+from matbench.solving.child import Child, Log
+from matbench.solving.worker import MAPS, TOLD, VOLUME, Job, Order
 
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerProcess
 
-LOG_ENDS = 1 << 16  # bytes kept of the beginning, and of the end, of a cell's output: a method may print without end
 _TICK = 0.05  # seconds between two looks at a process
 _TREE_LOOKS = 10  # every tenth look includes the processes that it started: these take longer to find and to measure
 _STACK_SECONDS = 0.5  # that a process has to print its stack before it is killed
@@ -42,138 +47,225 @@ class Dismissed(Exception):
 
 
 @define
-class Log:
-    """The first and the last `LOG_ENDS` bytes that a process prints.
+class Count:
+    """What the keeper counts of a timed solve: the machine before and after it, and the most memory held."""
 
-    Parameters
-    ----------
-    source
-        The file descriptor to read, not blocking.
-    left_out
-        How many bytes between the two were dropped.
-    """
-
-    source: int
-    first: bytearray = field(factory=bytearray)
-    last: bytearray = field(factory=bytearray)
-    left_out: int = 0
-
-    def take(self) -> bool:
-        """Read what is there now; False if that is nothing."""
-        try:
-            found = os.read(self.source, LOG_ENDS)
-        except BlockingIOError:
-            return False
-        room = LOG_ENDS - len(self.first)
-        self.first += found[:room]
-        self.last += found[room:]
-        beyond = max(0, len(self.last) - LOG_ENDS)
-        del self.last[:beyond]
-        self.left_out += beyond
-        return bool(found)
-
-    def drain(self) -> None:
-        """Read what is left in the pipe."""
-        for _ in range(64):  # a process that has escaped may go on printing: not for ever
-            if not self.take():
-                return
-
-    def whole(self) -> bytes:
-        gap = f"\n... {self.left_out} bytes left out ...\n".encode() if self.left_out else b""
-        return bytes(self.first) + gap + bytes(self.last)
-
-    def __contains__(self, words: bytes) -> bool:
-        return words in self.first or words in self.last
+    start: disturbance.Moment | None = None
+    begin: disturbance.Moment | None = None
+    end: disturbance.Moment | None = None
+    peak_mb: float = 0.0
 
 
 @define
-class Child:
-    """The process that runs methods, as its keeper sees it.
+class Keeping:
+    """The inside of a keeper: its line, the process that runs methods, and the scene at hand.
 
     Parameters
     ----------
-    line
-        The pipe for jobs and answers.
-    output
-        The file descriptor of what it prints.
-    first
-        The job by whose settings it is confined.
-    is_fit
-        May it solve another cell? It says so itself.
-    heard
-        The part of an answer that has come so far. A method may write anything into this pipe by mistake.
-        So answers are lines of JSON, never pickles, and the keeper reads what is there and never waits
-        for more.
+    place
+        A folder of its own, for scenes and answers.
+    scene
+        What the views that lie in `views` are of: the scene's name, and its digest.
+    shared
+        Files in shared memory that the child has been seen with, where it has no shared memory of its own.
     """
 
-    pid: int
-    line: Connection
-    output: int
-    first: Job
-    is_fit: bool = True
-    heard: bytearray = field(factory=bytearray)
+    inbox: Connection
+    place: Path
+    is_confining: bool
+    child: Child | None = None
+    scene: tuple[str, str] | None = None
+    shared: set[Path] = field(factory=set)
 
-    @classmethod
-    def fork(cls, job: Job, inbox: Connection) -> "Child":
-        """Start a child that solves the cells sent to it. In the child this never returns.
+    @property
+    def views(self) -> Path:
+        return self.place / "views.npz"
 
-        It is forked from the keeper, which has the libraries loaded already and runs one thread only.
+    @property
+    def answer(self) -> Path:
+        return self.place / "answer"
+
+    def cell(self, job: Job) -> None:
+        """Solve a cell; the child stays if it is to solve the next one, too."""
+        if self.child is not None and not self.child.suits(job):
+            self.end_child()
+        limit = job.settings.timeout
+        end = None if limit is None else time.monotonic() + limit
+        with Store(job.run).building(job.cell) as draft:
+            (draft / "log.txt").touch()
+            failed = self._read_scene(job, end)
+            if failed is not None:
+                write_cell(draft, job.cell, evolve(failed, threads=job.threads, alone=job.alone))
+                return
+            if self.child is not None:
+                if self._attempt(job, draft, end):
+                    return
+                # earlier cells may have spoiled a shared process: this cell gets a second chance in a fresh one.
+                # Not after a timeout: the cell would take the whole time again.
+                _empty(draft)
+            self.child = Child.fork(job, self.inbox, self.is_confining)
+            self._attempt(job, draft, end)
+
+    def _read_scene(self, job: Job, end: float | None) -> Outcome | None:
+        """Have the scene's views written, unless they lie there; what the cell comes to where they cannot be."""
+        wanted = job.cell.scene, job.cell.scene_digest
+        if self.scene == wanted:
+            return None
+        self.scene = None
+        name, data, views = job.cell.scene, job.settings.data, self.views
+
+        def read() -> None:
+            from matbench.scenes.catalogue import load_scene
+
+            scene = load_scene(name, data)
+            if scene.digest != wanted[1]:
+                raise UserError(f"{name} is not what it was when the run was planned")
+            views_only.write(scene, views)
+
+        try:
+            said = self._errand(read, end)
+        except errand.Late:
+            return Outcome("timeout", reason=f"stopped after {job.settings.timeout:g} s")
+        if said:
+            return Outcome("failed", reason=said)
+        self.scene = wanted
+        return None
+
+    def _attempt(self, job: Job, draft: Path, end: float | None) -> bool:
+        """Fill a cell's folder by what the child answers; whether that settles the cell.
+
+        A child that is not fit for another cell is ended, with all that it started.
         """
-        line, theirs = Pipe()
-        output, printed = os.pipe()
-        keeper = os.getpid()
-        pid = os.fork()
-        if not pid:
-            try:
-                os.setsid()  # a method that signals its process group must not reach the keeper
-                processes.die_with_parent(keeper)
-                # an end that stayed open here would keep the pipe alive when the keeper or the run has gone
-                for ours in (inbox, line):
-                    ours.close()
-                os.close(output)
-                serve(theirs, printed, job)
-            finally:
-                os._exit(1)  # never back into the keeper's own code, a copy of which this process has
-        theirs.close()
-        os.close(printed)
-        os.set_blocking(output, False)
-        return cls(pid, line, output, job)
+        assert self.child is not None, "the caller has seen to that"  # noqa: S101
+        log, count, stays = Log(self.child.output), Count(), False
+        shutil.rmtree(self.answer, ignore_errors=True)
+        self.answer.mkdir()
+        try:
+            outcome = self._watch(self.child, job, end, log, count)
+            stays = outcome is None and self.child.is_fit and job.settings.isolation == "shared"
+        finally:
+            # first kill, then drain, then close: else output is lost, or the child still prints into a closed pipe
+            if not stays:
+                processes.kill_descendants()
+            log.drain()
+            if not stays:
+                self.end_child()
+        if outcome is None:
+            outcome = self._taken(job, draft, count, end)
+        if outcome.status != "ok":
+            _empty(draft)
+        write_cell(draft, job.cell, evolve(outcome, threads=job.threads, alone=job.alone))
+        (draft / "log.txt").write_bytes(log.whole())
+        return stays or outcome.status in FINAL or outcome.status == "timeout"
 
-    def suits(self, job: Job) -> bool:
-        """May another job be solved here: is its isolation "shared", with the same threads and memory limit?"""
-        first = self.first
-        same = (job.threads, job.settings.memory_each()) == (first.threads, first.settings.memory_each())
-        return same and job.settings.isolation == "shared"
-
-    def answer(self) -> str | None:
-        """The answer for its cell (`matbench.solving.worker.serve`); None while it is not complete.
+    def _watch(self, child: Child, job: Job, end: float | None, log: Log, count: Count) -> Outcome | None:
+        """Wait until the child has answered: None, or what the cell comes to without an answer.
 
         Raises
         ------
-        EOFError
-            If the child has closed its end: no answer will come.
-        ValueError
-            If what came is not an answer.
+        Dismissed
+            If the line ends meanwhile.
+        OSError
+            If the child could not write its answer.
         """
-        found = os.read(self.line.fileno(), LOG_ENDS)
-        if not found:
-            raise EOFError
-        self.heard += found
-        if not self.heard.endswith(b"\n"):
-            if len(self.heard) > LOG_ENDS:
-                raise ValueError("no answer is so long")
-            return None
-        try:
-            said, is_fit = json.loads(self.heard)
-        except (TypeError, RecursionError) as error:
-            raise ValueError("no answer") from error
-        self.heard.clear()
-        self.is_fit = is_fit is True
-        return str(said)
+        limit, kills = job.settings.memory_each(), memory.kills_for_memory()
+        sources: list[Any] = [self.inbox, child.output, child.line]
+        count.start = disturbance.moment(child.pid)
+        with suppress(OSError):  # it has ended already: seen below
+            child.line.send(Order(job, self.views, self.answer))
+        looks, next_look = 0, time.monotonic()
+        while True:
+            ready = wait(sources, _TICK)
+            if self.inbox in ready:  # no second job comes before the answer: it can only be the end
+                raise Dismissed
+            if child.output in ready and not log.take():
+                sources.remove(child.output)  # a closed pipe is always ready, and `wait` would not wait any more
+            if child.line in ready:
+                try:
+                    if _heard(child, count):
+                        return None
+                except EOFError:
+                    sources.remove(child.line)
+                except ValueError:
+                    return Outcome(
+                        "crashed", reason="the method wrote into a file of the harness that it had not opened"
+                    )
+            if child.pid in (ended := processes.reap()):
+                log.drain()
+                return _how_it_ended(ended[child.pid], log, kills)
+            now = time.monotonic()
+            if end is not None and now > end:
+                _print_stack(child, log)
+                return Outcome("timeout", reason=f"stopped after {job.settings.timeout:g} s")
+            if now < next_look:
+                continue
+            # a method that prints all the time wakes `wait` at once; its memory is still read every _TICK only
+            looks, next_look = looks + 1, now + _TICK
+            used = memory.used(child.pid, whole_tree=looks % _TREE_LOOKS == 0)
+            if not self.is_confining and looks % _TREE_LOOKS == 0:
+                self.shared |= memory.left_in_shared_memory(child.pid)
+            if count.begin is not None and count.end is None:
+                count.peak_mb = max(count.peak_mb, used)
+            if used > limit:
+                _print_stack(child, log)
+                return Outcome("out-of-memory", reason=f"stopped: it held {used:.0f} MiB, {limit} MiB are its limit")
 
-    def close(self) -> None:
-        self.line.close()
-        os.close(self.output)
+    def _taken(self, job: Job, draft: Path, count: Count, end: float | None) -> Outcome:
+        """Check what the child has left and take it in; what the cell comes to."""
+        try:
+            outcome = intake.outcome(self.answer)
+            if outcome.status != "ok":
+                return outcome
+            if not intake.take(self.answer / MAPS, draft / MAPS):
+                raise ValueError("it has left no maps")
+            scene = views_only.read(self.views)
+            maps = intake.maps(draft / MAPS, scene)
+            intake.take(self.answer / VOLUME, draft / VOLUME)
+            outcome = _timed(evolve(outcome, maps=maps_digest(maps)), count, job.threads)
+            if job.settings.record is not None and not job.cell.repeat and not outcome.reason:
+                outcome = self._record(job, draft, outcome, scene.height, end)
+        except ValueError as error:
+            return Outcome("failed", reason=f"its answer cannot be used: {error}")
+        except errand.Late:
+            return Outcome("timeout", reason=f"stopped after {job.settings.timeout:g} s")
+        return outcome
+
+    def _record(self, job: Job, draft: Path, outcome: Outcome, height: int, end: float | None) -> Outcome:
+        """Have a recording made of what the method told; the outcome with what was recorded, or why nothing was."""
+        assert job.settings.record is not None, "the caller has looked"  # noqa: S101
+        heard, name, data = self.place / TOLD, job.cell.scene, job.settings.data
+        heard.unlink(missing_ok=True)
+        if not intake.take(self.answer / TOLD, heard):
+            return evolve(outcome, reason="not recorded: it has told nothing")
+
+        def record() -> None:
+            from matbench.recording import rrd, told
+            from matbench.scenes.catalogue import load_scene
+
+            rrd.record_told(draft / "recording.rrd", load_scene(name, data), told.read(heard), title=str(job.cell))
+
+        said = self._errand(record, end)
+        heard.unlink()
+        if said:
+            return evolve(outcome, reason=f"not recorded: {said}")
+        return evolve(outcome, recorded=job.settings.record.at(height))
+
+    def _errand(self, work: Callable[[], None], end: float | None) -> str:
+        try:
+            return errand.run(work, self.inbox, end)
+        except EOFError as error:
+            raise Dismissed from error
+
+    def end_child(self) -> None:
+        """End the process that runs methods, and all that it has started."""
+        if self.child is not None:
+            processes.kill_descendants()
+            self.child.close()
+            self.child = None
+        for left in self.shared:
+            with suppress(OSError):
+                left.unlink()
+        self.shared.clear()
 
 
 def keep(inbox: Connection) -> None:
@@ -184,66 +276,81 @@ def keep(inbox: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # through `finally`: the child goes, too
     processes.lead_own_session()  # Ctrl-C is for the run, which then dismisses its keepers
-    child: Child | None = None
-    try:
-        while True:
-            job = inbox.recv()
-            try:
-                child = _solve_cell(job, inbox, child)
-                said = ""
-            except (OSError, ValueError) as error:  # the disk is full, say
-                processes.kill_descendants()
-                child, said = None, str(error)
-            inbox.send(said)
-    except (EOFError, BrokenPipeError, ConnectionResetError, Dismissed):
-        pass
-    finally:
-        processes.kill_descendants()
-
-
-def _solve_cell(job: Job, inbox: Connection, child: Child | None) -> Child | None:
-    """Solve a cell, by `child` if it suits, else by a new one; return the child if it may solve the next cell, too."""
-    store = Store(job.run)
-    if child is not None and not child.suits(job):
-        processes.kill_descendants()
-        child.close()
-        child = None
-    with store.building(job.cell) as draft:
-        if child is not None:
-            stays = _attempt(job, draft.resolve(), inbox, child)
-            if stays or stays is None:
-                return child if stays else None
-            # earlier cells may have spoiled a shared process: this cell gets a second chance in a fresh one.
-            # Not after a timeout: the cell would take the whole time again.
-            _empty(draft)
-        child = Child.fork(job, inbox)
-        return child if _attempt(job, draft.resolve(), inbox, child) else None
-
-
-def _attempt(job: Job, draft: Path, inbox: Connection, child: Child) -> bool | None:
-    """Have `child` solve a cell and fill its folder.
-
-    Returns
-    -------
-    Whether the child may solve another cell; None if this one ran into its time limit. A child that may
-    not is killed, with all that it has started.
-    """
-    log, stays = Log(child.output), False
-    try:
-        outcome = _watch(job, draft, inbox, child, log)
-        stays = outcome is None and child.is_fit and job.settings.isolation == "shared"
-    finally:
-        # first kill, then drain, then close: else output is lost, or the child still prints into a closed pipe
-        if not stays:
+    with tempfile.TemporaryDirectory(prefix=f"matbench-{os.getpid()}-") as place:
+        keeping = Keeping(inbox, Path(place), confinement.is_possible())
+        try:
+            while True:
+                job = inbox.recv()
+                try:
+                    keeping.cell(job)
+                    said = ""
+                except (OSError, ValueError) as error:  # the disk is full, say
+                    keeping.end_child()
+                    said = str(error)
+                inbox.send(said)
+        except (EOFError, BrokenPipeError, ConnectionResetError, Dismissed):
+            pass
+        finally:
             processes.kill_descendants()
-        log.drain()
-        if not stays:
-            child.close()
-    if outcome is not None:
-        _empty(draft)  # of what the child had half written
-        write_cell(draft, job.cell, evolve(outcome, threads=job.threads, alone=job.alone))
-    (draft / "log.txt").write_bytes(log.whole())
-    return None if outcome is not None and outcome.status == "timeout" else stays
+
+
+def _heard(child: Child, count: Count) -> bool:
+    """Take in what a child says; whether it has answered.
+
+    Raises
+    ------
+    EOFError
+        If nothing more can come.
+    ValueError
+        If it says what it does not say by itself.
+    OSError
+        If it could not write its answer.
+    """
+    try:
+        messages = child.messages()
+    except OSError as error:
+        raise EOFError from error
+    for message in messages:
+        if message.word == "lost":
+            raise OSError(message.reason)
+        if message.word == "done":
+            child.is_fit = message.is_fit
+            return True
+        now = disturbance.moment(child.pid)
+        if message.word == "begins" and count.begin is None:
+            count.begin = now
+        elif message.word == "ends" and count.begin is not None and count.end is None:
+            count.end = now
+        else:
+            raise ValueError(f"{message.word} twice")
+        with suppress(OSError):
+            child.line.send_bytes(b"")
+    return False
+
+
+def _timed(outcome: Outcome, count: Count, threads: int) -> Outcome:
+    """An outcome with what its keeper has counted: seconds, processor seconds, memory, and what others took.
+
+    Raises
+    ------
+    ValueError
+        If the child has not let itself be timed.
+    """
+    if count.start is None or count.begin is None or count.end is None or outcome.seconds is None:
+        raise ValueError("it was not timed")
+    solve = disturbance.between(count.begin, count.end)
+    # the system counts coarsely: of a short solve, what others took while it was warmed up says more
+    looked = solve if solve.wall >= disturbance.SHORTEST else disturbance.between(count.start, count.end)
+    outcome = intake.corrected(outcome, solve.wall)
+    if not outcome.doubt and looked.is_disturbed(threads, cores()):
+        taken = looked.others + looked.stolen
+        outcome = evolve(outcome, doubt=f"others took {taken:.2g} processor seconds of {looked.wall:.2g} s")
+    return evolve(
+        outcome,
+        peak_mb=max(outcome.peak_mb or 0.0, count.peak_mb),
+        processor_seconds=solve.own,
+        others_seconds=solve.others + solve.stolen,
+    )
 
 
 def _empty(draft: Path) -> None:
@@ -254,64 +361,12 @@ def _empty(draft: Path) -> None:
             half.unlink()
 
 
-def _watch(job: Job, draft: Path, inbox: Connection, child: Child, log: Log) -> Outcome | None:
-    """Wait for the child; None if it has written the cell, else the outcome to write in its place.
-
-    Raises
-    ------
-    Dismissed
-        If the run has gone or wants no more.
-    OSError
-        If the child could not write the cell.
-    """
-    begin = time.monotonic()
-    limit, memory = job.settings.timeout, job.settings.memory_each()
-    kills = processes.kills_for_memory()
-    sources: list[Any] = [inbox, child.output, child.line]
-    with suppress(OSError):  # it has ended already: seen below
-        child.line.send((job, draft))
-    looks, next_look = 0, begin
-    while True:
-        ready = wait(sources, _TICK)
-        if inbox in ready:  # no second job comes before the answer: it can only be the end
-            raise Dismissed
-        if child.output in ready and not log.take():
-            sources.remove(child.output)  # a closed pipe is always ready, and `wait` would not wait any more
-        if child.line in ready:
-            try:
-                said = child.answer()
-            except (EOFError, OSError):
-                sources.remove(child.line)
-            except ValueError:
-                return Outcome("crashed", reason="the method wrote into a file of the harness that it had not opened")
-            else:
-                if said:
-                    raise OSError(said)
-                if said is not None:
-                    return None
-        if child.pid in (ended := processes.reap()):
-            log.drain()
-            return _how_it_ended(ended[child.pid], log, kills)
-        now = time.monotonic()
-        if limit is not None and now - begin > limit:
-            _print_stack(child, log)
-            return Outcome("timeout", reason=f"stopped after {limit:g} s")
-        if now < next_look:
-            continue
-        # a method that prints all the time wakes `wait` at once; its memory is still read every _TICK only
-        looks, next_look = looks + 1, now + _TICK
-        used = processes.memory_used(child.pid, whole_tree=looks % _TREE_LOOKS == 0)
-        if used > memory:
-            _print_stack(child, log)
-            return Outcome("out-of-memory", reason=f"stopped: it held {used:.0f} MiB, {memory} MiB are its limit")
-
-
 def _how_it_ended(status: int, log: Log, kills: int) -> Outcome:
     """The outcome for a child that ended before it answered, by itself or by the system."""
     code = os.waitstatus_to_exitcode(status)
     if b"std::bad_alloc" in log:  # C++ that meets the memory limit aborts: only its message tells this from a crash
         return Outcome("out-of-memory", reason="the method ended its process: std::bad_alloc")
-    if code == -signal.SIGKILL and processes.kills_for_memory() > kills:
+    if code == -signal.SIGKILL and memory.kills_for_memory() > kills:
         return Outcome("out-of-memory", reason="the system ended the method's process: memory had run out")
     if code >= 0:
         return Outcome("crashed", reason=f"the method ended its process (exit status {code})")

@@ -1,75 +1,18 @@
-"""Processes: the memory that they use, the limits that they get, and how they are ended with all they started."""
+"""Processes: how they are started, what they use, and how they are ended with all they started."""
 
 import ctypes
 import os
-import resource
 import signal
 import sys
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from multiprocessing import forkserver, get_context
-from pathlib import Path
 
 import psutil
 
-_MIB = 1 << 20
-# MiB added to the hard limit: threads reserve stacks and arenas that they never touch. The keeper ends
-# a process that really holds more than its limit; this limit only stops allocations far beyond it.
-_SLACK = 256
-_DEATH_SIGNAL, _CHILD_SUBREAPER = 1, 36  # PR_SET_PDEATHSIG and PR_SET_CHILD_SUBREAPER of prctl(2)
+# PR_SET_PDEATHSIG, PR_SET_DUMPABLE and PR_SET_CHILD_SUBREAPER of prctl(2)
+_DEATH_SIGNAL, _DUMPABLE, _CHILD_SUBREAPER = 1, 4, 36
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-
-
-def memory_used(pid: int, whole_tree: bool = True) -> float:
-    """Resident memory, in MiB, of a process and, with `whole_tree`, of all its descendants.
-
-    Memory that several of them share counts once. A process that has just ended has none.
-    """
-    try:
-        process = psutil.Process(pid)
-        tree = [process, *(process.children(recursive=True) if whole_tree else ())]
-        if len(tree) == 1:  # by far the quickest to read; sharing matters only among several
-            return float(process.memory_info().rss / _MIB)
-        return sum(_proportional_size(one) for one in tree) / _MIB
-    except psutil.Error:
-        return 0.0
-
-
-def _proportional_size(process: psutil.Process) -> int:
-    """Bytes of a process, shared pages divided among those that share them (PSS); else its resident bytes."""
-    with suppress(psutil.Error, AttributeError):
-        return int(process.memory_full_info().pss)
-    with suppress(psutil.Error):
-        return int(process.memory_info().rss)
-    return 0
-
-
-def kills_for_memory() -> int:
-    """How many processes Linux has killed since it booted because memory had run out; 0 where that is not known."""
-    with suppress(OSError):
-        for line in Path("/proc/vmstat").read_text().splitlines():
-            if line.startswith("oom_kill "):
-                return int(line.split()[1])
-    return 0
-
-
-def confine(memory: int) -> None:
-    """Limit this process, and those that it starts, to `memory` MiB of further private memory.
-
-    A runaway allocation then raises `MemoryError` where it happens, before it has taken anything. If
-    the machine runs out of memory all the same, the system ends this process first. It leaves no core file.
-    """
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a core file is as large as the memory, and nobody reads it
-    with suppress(OSError, ValueError):
-        # 1000 is the highest: the system chooses this process before the harness or anything else of the user's
-        Path("/proc/self/oom_score_adj").write_text("1000")
-    with suppress(OSError, ValueError, StopIteration):
-        lines = Path("/proc/self/status").read_text().splitlines()
-        # not RLIMIT_AS: that counts reserved addresses, of which numba, OpenCV and threads take many and use few.
-        # The limit counts what the process has already inherited, so that is added.
-        now = next(int(line.split()[1]) for line in lines if line.startswith("VmData:")) // 1024
-        limit = (now + memory + _SLACK) * _MIB
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
 def use_threads(count: int) -> None:
@@ -131,6 +74,11 @@ def die_with_parent(parent: int) -> None:
     # the parent may have ended between the fork and the line above: then no signal will come
     if os.getppid() != parent:
         os._exit(1)
+
+
+def keep_private() -> None:
+    """Have the system refuse other processes of the same user a look into the memory of this one (Linux)."""
+    _prctl(_DUMPABLE, 0)
 
 
 def _prctl(option: int, value: int) -> None:

@@ -1,4 +1,8 @@
-"""Solving cells: what happens in the child process that a keeper watches. Here, and only here, methods run."""
+"""Solving cells: what happens in the child process that a keeper watches. Here, and only here, methods run.
+
+This process never holds truth: scenes come to it as files of views, and what recordings show besides is added by
+another process. It writes what it has found into a folder of its own, which the keeper checks and takes in.
+"""
 
 import ctypes
 import faulthandler
@@ -7,16 +11,17 @@ import os
 import resource
 import signal
 import sys
-import time
 import traceback
 from contextlib import suppress
 from math import isfinite
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from time import perf_counter  # by its own name: a method may put another clock into the module
+from typing import Any, Literal
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve, field, frozen
+from cattrs.preconf.json import make_converter
 from numpy.typing import NDArray
 
 from matbench import spec
@@ -26,13 +31,17 @@ from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell
 from matbench.plans.settings import Settings
-from matbench.runs.store import FINAL, Outcome, Status, write_cell
+from matbench.runs.store import FINAL, Outcome, Status
 from matbench.scene import Scene
-from matbench.scenes.catalogue import load_scene
-from matbench.solving import processes
+from matbench.scenes import views_only
+from matbench.solving import memory, processes
 from matbench.spec import first_line
 
-_TINY = 16, 64  # rows and columns of the crop for the first, untimed solve, which compiles the kernels
+_TINY = 16, 64  # rows and columns of the scene for the first, untimed solve, which compiles the kernels
+OUTCOME, MAPS, VOLUME, TOLD = "outcome.json", "disparity.npz", "volume.npz", "told.npz"
+"""What lies in the folder of an answer."""
+
+_json = make_converter()
 
 
 @frozen
@@ -57,25 +66,72 @@ class Job:
     alone: bool = True
 
 
-def tiny(scene: Scene) -> Scene:
-    """The top left corner of a scene: the same views, types and range, few pixels."""
-    rows, columns = (min(a, b) for a, b in zip(_TINY, (scene.height, scene.width), strict=True))
-    return evolve(
-        scene,
-        views=scene.views[:, :rows, :columns],
-        truth={view: truth[:rows, :columns] for view, truth in scene.truth.items()},
-        regions={name: mask[:rows, :columns] for name, mask in scene.regions.items()},
-        visible={view: seen[:, :rows, :columns] for view, seen in scene.visible.items()},
-    )
+@frozen
+class Order:
+    """A job as its keeper hands it on: where the scene's views lie, and the folder that the answer goes to."""
+
+    job: Job
+    views: Path
+    answer: Path
 
 
-def hide_truth(scene: Scene) -> Scene:
-    """The scene as a method may see it: without ground truth, regions, visibility and the held-out view."""
-    return evolve(scene, truth={}, regions={}, visible={}, held_out=None)
+@frozen
+class Message:
+    """What this process tells its keeper, as a line of JSON.
+
+    Parameters
+    ----------
+    word
+        The timed solve ``begins``, it ``ends``, the answer is ``done``, or could not be written: ``lost``.
+    reason
+        Why it could not be written.
+    is_fit
+        Can this process solve another cell?
+    """
+
+    word: Literal["begins", "ends", "done", "lost"]
+    reason: str = ""
+    is_fit: bool = False
+
+
+@frozen
+class KeeperLine:
+    """The line to the keeper, which counts from outside: it takes the time between ``begins`` and ``ends``."""
+
+    line: Connection
+    process: int = field(factory=os.getpid)
+
+    def say(self, message: Message) -> None:
+        if os.getpid() != self.process:  # the method has forked and both returned: only the original goes on
+            os._exit(1)
+        os.write(self.line.fileno(), json.dumps(_json.unstructure(message)).encode() + b"\n")
+
+    def say_and_wait(self, word: Literal["begins", "ends"]) -> None:
+        """Go on only when the keeper has counted, so that its counting disturbs nothing that is timed."""
+        self.say(Message(word))
+        self.line.recv_bytes()
+
+
+@frozen(eq=False)
+class Answer:
+    """What became of a cell, with its maps and its volume where it has them."""
+
+    outcome: Outcome
+    maps: dict[int, NDArray[np.float32]] = field(factory=dict)
+    volume: StoredVolume | None = None
+
+
+def like(scene: Scene, size: tuple[int, int]) -> Scene:
+    """A scene of noise with the name, views, types and range of another, of so many rows and columns.
+
+    Methods are compiled on it: they never see the scene that is timed before its time.
+    """
+    views = np.random.default_rng(0).integers(0, 256, (scene.n, *size, 3), np.uint8)
+    return evolve(scene, views=views)
 
 
 def checked(estimate: Any, scene: Scene) -> dict[int, NDArray[np.float32]]:
-    """The disparity maps of an estimate as float32; infinities become NaN.
+    """The disparity maps of an estimate as float32; what is masked or infinite becomes NaN: no answer.
 
     Raises
     ------
@@ -88,13 +144,14 @@ def checked(estimate: Any, scene: Scene) -> dict[int, NDArray[np.float32]]:
         raise ValueError(f"the estimate has no disparity map of the reference view {scene.ref}")
     maps = {}
     for view, values in estimate.disparity.items():
-        array = np.asarray(values)
-        if not 0 <= view < scene.n:
-            raise ValueError(f"the estimate has a map of view {view}, the scene has {scene.n} views")
+        if not isinstance(view, int | np.integer) or isinstance(view, bool) or not 0 <= view < scene.n:
+            raise ValueError(f"the estimate has a map of view {view!r}, the scene has the views 0 to {scene.n - 1}")
+        array = np.asanyarray(values)  # `asarray` would forget a mask
         if array.shape != (scene.height, scene.width) or array.dtype.kind not in "fiu":
             expected = f"{(scene.height, scene.width)} numbers"
             raise ValueError(f"the map of view {view} is {array.shape} {array.dtype}, not {expected}")
-        single = array.astype(np.float32)
+        with np.errstate(over="ignore"):  # too large for float32 is infinite
+            single = np.ma.filled(np.ma.asarray(array, np.float32), np.float32(np.nan))
         maps[int(view)] = np.where(np.isfinite(single), single, np.float32(np.nan))
     return maps
 
@@ -128,93 +185,95 @@ def _volume(estimate: Estimate, scene: Scene) -> StoredVolume | None:
     return volume
 
 
-def _solve(
-    method: Algorithm, scene: Scene, job: Job
-) -> tuple[Outcome, dict[int, NDArray[np.float32]] | None, StoredVolume | None]:
-    unsupported = getattr(method, "unsupported_reason", None)
-    reason = unsupported(scene) if unsupported else None
-    if reason:
-        return Outcome("skipped", reason=str(reason)), None, None
-    context = Context(job.cell.seed, job.threads)
-    # numba compiles on the first call: a first solve on a small crop keeps that out of the timed one
-    start = time.perf_counter()
+def _warm_up(method: Algorithm, scene: Scene, context: Context) -> Estimate:
+    """Have a method compile what it compiles; its answer for noise."""
+    rows, columns = (min(a, b) for a, b in zip(_TINY, (scene.height, scene.width), strict=True))
     try:
-        warm = method.solve(tiny(scene), context)
-    except Exception:  # the crop may be too small for this method, and nobody asked for it: no failure
-        warm = method.solve(scene, context)
-    warmed = time.perf_counter()
+        return method.solve(like(scene, (rows, columns)), context)
+    except Exception:  # so few pixels may be too small for this method, and nobody asked for it: no failure
+        return method.solve(like(scene, (scene.height, scene.width)), context)
+
+
+def _solve(method: Algorithm, scene: Scene, job: Job, keeper: KeeperLine) -> Answer:
+    reason = plugins.unsupported(method, scene)
+    if reason:
+        return Answer(Outcome("skipped", reason=reason))
+    context = Context(job.cell.seed, job.threads)
+    # numba compiles on the first call: a first solve of few pixels keeps that out of the timed one
+    start = perf_counter()
+    warm = _warm_up(method, scene, context)
+    warmed = perf_counter()
     _reset_peak()
-    begin = time.perf_counter()
+    keeper.say_and_wait("begins")
+    begin = perf_counter()
     estimate = method.solve(scene, evolve(context, volume=job.settings.volumes))
-    seconds = time.perf_counter() - begin
+    seconds = perf_counter() - begin
     peak = _peak_mb()
+    keeper.say_and_wait("ends")
     maps = checked(estimate, scene)
     history = {name: [v if isfinite(v) else None for v in map(float, vs)] for name, vs in estimate.history.items()}
     work = {name: int(count) for name, count in estimate.work.items()}
     volume = _volume(estimate, scene) if job.settings.volumes else None
     has_volume = volume is not None if job.settings.volumes else getattr(warm, "volume", None) is not None
     outcome = Outcome("ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history, alone=job.alone)
-    return outcome, maps, volume
+    return Answer(outcome, maps, volume)
 
 
-def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcome:
-    """Solve a second time with a probe and write the recording.
-
-    Returns
-    -------
-    The outcome, with what was recorded, or with the reason why there is no recording. The answer of the
-    first solve stays: a recording that fails costs no score.
-    """
-    from matbench.recording.rrd import record
+def _listen(method: Algorithm, scene: Scene, job: Job, path: Path) -> str:
+    """Solve again and write down what the method tells, for a recording; why there is none, else nothing."""
+    from matbench.recording import told
+    from matbench.recording.probe import CapturingProbe
 
     assert job.settings.record is not None, "the caller has looked"  # noqa: S101
-    scene = load_scene(job.cell.scene, job.settings.data)
-    wanted = job.settings.record.at(scene.height)
-
-    def solve(probe: Any) -> Estimate:
-        return method.solve(hide_truth(scene), Context(job.cell.seed, job.threads, probe))
-
     try:
-        record(path, scene, solve, title=str(job.cell), wanted=wanted)
+        probe = CapturingProbe(job.settings.record.at(scene.height))
+        estimate = method.solve(scene, Context(job.cell.seed, job.threads, probe))
+        plain = Estimate(checked(estimate, scene), estimate.volume)  # the harness's own types only
+        told.write(path, told.Told(probe, plain))
     except Exception as error:
         traceback.print_exc()
-        return evolve(outcome, reason=f"not recorded: {type(error).__name__}: {first_line(error)}")
-    return evolve(outcome, recorded=wanted)
+        return f"not recorded: {type(error).__name__}: {first_line(error)}"
+    return ""
 
 
-def run_cell(job: Job, draft: Path) -> Outcome:
-    """Solve a cell and fill its folder, whatever the method raises; the outcome."""
-    cell, process, place = job.cell, os.getpid(), Path.cwd()
-    maps = volume = None
+def run_cell(order: Order, keeper: KeeperLine) -> Outcome:
+    """Solve a cell and fill the folder of its answer, whatever the method raises."""
+    job, process, place = order.job, os.getpid(), Path.cwd()
+    cell, answer = job.cell, Answer(Outcome("failed"))
     try:
         plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
         method = spec.build(plugin.name, plugin.load(), cell.method.params)
         # files may have been edited since the plan was made: results must not stand under the old digest
         if plugins.method_digest(plugin, method) != cell.method.code:
             raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
-        scene = hide_truth(load_scene(cell.scene, job.settings.data))
-        if scene.digest != cell.scene_digest:
-            raise UserError(f"{cell.scene} is not what it was when the run was planned")
-        outcome, maps, volume = _solve(method, scene, job)
-        if os.getpid() != process:  # the method has forked and both returned: only the original goes on
-            os._exit(1)
+        scene = views_only.read(order.views)
+        answer = _solve(method, scene, job, keeper)
         # `evolve` makes a scene whose digest is not cached: it is computed from the pixels as they are now
         if evolve(scene).digest != cell.scene_digest:
             raise ValueError("the method wrote into its input")
         os.chdir(place)
-        if job.settings.record is not None and not cell.repeat and outcome.status == "ok":
-            outcome = _record(method, job, draft / "recording.rrd", outcome)
+        if job.settings.record is not None and not cell.repeat and answer.outcome.status == "ok":
+            reason = _listen(method, scene, job, order.answer / TOLD)
+            answer = evolve(answer, outcome=evolve(answer.outcome, reason=reason))
     except BaseException as error:  # a method may raise SystemExit and KeyboardInterrupt; no Ctrl-C comes here
         if os.getpid() != process:
             os._exit(1)
         traceback.print_exc()
         status, reason = _what_failed(error)
-        outcome = Outcome(status, threads=job.threads, reason=reason, alone=job.alone)
-        maps = volume = None
+        answer = Answer(Outcome(status, threads=job.threads, reason=reason, alone=job.alone))
     finally:
         os.chdir(place)
-    write_cell(draft, cell, outcome, maps, volume)
-    return outcome
+    _write(answer, order.answer)
+    return answer.outcome
+
+
+def _write(answer: Answer, folder: Path) -> None:
+    if answer.volume is not None:
+        answer.volume.write(folder / VOLUME)
+    if answer.maps:
+        arrays: dict[str, Any] = {f"view_{view}": values for view, values in answer.maps.items()}
+        np.savez_compressed(folder / MAPS, **arrays)
+    (folder / OUTCOME).write_text(json.dumps(_json.unstructure(answer.outcome), allow_nan=False), encoding="utf-8")
 
 
 def _what_failed(error: BaseException) -> tuple[Status, str]:
@@ -230,10 +289,9 @@ def _what_failed(error: BaseException) -> tuple[Status, str]:
 
 
 def serve(line: Connection, printed: int, job: Job) -> None:
-    """The child process: solve the cells that come in, one by one. Never returns.
+    """The child process: solve the cells that come in (`Order`), one by one, telling the keeper (`Message`).
 
-    The answer to each is one line of JSON, a pair: "" or why the cell could not be written; and whether this
-    process may solve another cell.
+    Never returns.
 
     Parameters
     ----------
@@ -253,18 +311,19 @@ def serve(line: Connection, printed: int, job: Job) -> None:
         for number in (1, 2)
     )
     faulthandler.enable(file=2)
-    processes.confine(job.settings.memory_each())
+    memory.confine(job.settings.memory_each())
     processes.use_threads(job.threads)
-    environment = dict(os.environ)
+    os.environ[views_only.VARIABLE] = "1"
+    keeper, environment = KeeperLine(line), dict(os.environ)
     with suppress(EOFError, OSError):
         while True:
-            job, draft = line.recv()
+            order = line.recv()
             try:
-                said, is_fit = "", run_cell(job, draft).status in FINAL
+                message = Message("done", is_fit=run_cell(order, keeper).status in FINAL)
             except OSError as error:
-                said, is_fit = f"{type(error).__name__}: {error}", False
+                message = Message("lost", f"{type(error).__name__}: {error}")
             _flush()
-            os.write(line.fileno(), json.dumps([said, is_fit]).encode() + b"\n")
+            keeper.say(message)
             # what a method changes in its environment must not reach the next cell of a shared process
             os.environ.clear()
             os.environ.update(environment)

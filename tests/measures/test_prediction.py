@@ -16,7 +16,7 @@ from matbench.measures.prediction import coverage, differences, hold_out, predic
 from matbench.measures.warping import TEAR, carry
 from matbench.regions import REGIONS
 from matbench.scene import Scene
-from matbench.solving.worker import hide_truth
+from matbench.scenes.views_only import without_truth
 
 NAN = np.nan
 
@@ -118,9 +118,9 @@ def test_methods_do_not_see_the_view_and_its_truth(scene: Scene) -> None:
     assert held.held_out is not None
     assert (held.held_out.label, held.held_out.steps) == ("4", 2)
     np.testing.assert_array_equal(held.held_out.image, scene.views[4])
-    assert hide_truth(held).held_out is None
+    assert without_truth(held).held_out is None
     assert held.scored_regions.keys() == REGIONS.keys()
-    assert not hide_truth(held).scored_regions
+    assert not without_truth(held).scored_regions
     other = evolve(held, held_out=evolve(held.held_out, image=255 - held.held_out.image))
     assert other.digest == held.digest, "methods see the same"
     assert other.truth_digest != held.truth_digest, "but are not scored by the same"

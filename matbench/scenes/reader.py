@@ -1,0 +1,20 @@
+"""A process that reads a scene for one that may not see its truth: ``python -m matbench.scenes.reader FILE NAME``."""
+
+import sys
+from pathlib import Path
+
+from matbench.errors import UserError
+from matbench.scenes import views_only
+from matbench.scenes.catalogue import load_scene
+
+
+def main(path: str, name: str, data: str | None = None) -> None:
+    """Load a scene and write its views to a file; a `UserError` becomes a line on the error stream."""
+    try:
+        views_only.write(load_scene(name, data), Path(path))
+    except UserError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,71 @@
+"""What a process that runs methods can reach: the run folder to read only, shared memory of its own (Linux).
+
+Done in a mount namespace, which needs either the right to mount or user namespaces. Where neither is there, nothing is
+confined and `shut_in` says so; what a method then rewrites is found out by digests (`matbench.solving.run`).
+"""
+
+import ctypes
+import os
+import sys
+import tempfile
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+_NEWNS, _NEWUSER = 0x00020000, 0x10000000  # unshare(2)
+_RDONLY, _NOSUID, _NODEV, _REMOUNT, _BIND, _REC, _PRIVATE = 1, 2, 4, 32, 4096, 16384, 1 << 18  # mount(2)
+SHARED_MEMORY = "/dev/shm"  # noqa: S108 -- POSIX's name for it
+
+
+def shut_in(read_only: Path, shared_mb: int) -> bool:
+    """Let this process, and all that it starts, read a folder but not write to it; whether that worked.
+
+    Shared memory becomes one of its own, of `shared_mb` MiB at most, which is gone when the last of them ends: what a
+    method leaves there harms nobody.
+    """
+    if sys.platform != "linux":
+        return False
+    libc = ctypes.CDLL(None, use_errno=True)
+    user, group = os.getuid(), os.getgid()
+    if libc.unshare(_NEWNS):  # not allowed to mount as who we are: as the only user of a namespace of our own
+        if libc.unshare(_NEWUSER | _NEWNS):
+            return False
+        for name, text in (("setgroups", "deny"), ("uid_map", f"{user} {user} 1"), ("gid_map", f"{group} {group} 1")):
+            with suppress(OSError):
+                Path("/proc/self", name).write_text(text)
+    folder = os.fsencode(read_only)
+
+    def mount(source: bytes | None, target: bytes, kind: bytes | None, flags: int, options: bytes | None) -> bool:
+        return bool(libc.mount(source, target, kind, ctypes.c_ulong(flags), options) == 0)
+
+    # first cut the tie to the namespace that we come from, or everybody would see these mounts
+    if not mount(None, b"/", None, _REC | _PRIVATE, None):
+        return False
+    if Path(SHARED_MEMORY).is_dir():
+        mount(b"tmpfs", SHARED_MEMORY.encode(), b"tmpfs", _NOSUID | _NODEV, f"mode=1777,size={shared_mb}m".encode())
+    if not mount(folder, folder, None, _BIND, None):
+        return False
+    return mount(None, folder, None, _BIND | _REMOUNT | _RDONLY, None)
+
+
+@cache
+def is_possible() -> bool:
+    """Can a process on this system be shut in? A process that ends at once has tried it."""
+    with tempfile.TemporaryDirectory(prefix="matbench-") as folder:
+        pid = os.fork()
+        if not pid:
+            try:
+                os._exit(0 if shut_in(Path(folder), 1) else 1)
+            finally:
+                os._exit(1)
+        return os.waitpid(pid, 0)[1] == 0
+
+
+def shared_memory_mb(pid: int) -> float | None:
+    """MiB that files in the shared memory of a process hold, where it has one of its own; else None."""
+    with suppress(OSError):
+        inside = Path("/proc", str(pid), "root" + SHARED_MEMORY)
+        if inside.stat().st_dev != Path(SHARED_MEMORY).stat().st_dev:
+            found = os.statvfs(inside)
+            return (found.f_blocks - found.f_bfree) * found.f_frsize / 2**20
+    return None

@@ -1,0 +1,69 @@
+"""One solve that is listened to, for a figure: in a process that has no truth."""
+
+import os
+from collections.abc import Sequence
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from matbench import spec
+from matbench.algorithm import Context, Estimate
+from matbench.errors import UserError
+from matbench.plans import limits, plugins
+from matbench.plans.plan import Cell
+from matbench.plans.record_option import RecordOption
+from matbench.recording import told
+from matbench.recording.probe import CapturingProbe
+from matbench.scene import Scene
+from matbench.scenes import views_only
+from matbench.solving import processes
+from matbench.solving.environment import kernels_kept, without_main
+from matbench.solving.worker import checked
+from matbench.spec import first_line
+
+
+def listen(cell: Cell, files: Sequence[Path], scene: Scene, wanted: RecordOption) -> told.Told:
+    """Have a process of its own solve a cell once more; what the method told, and its estimate.
+
+    Raises
+    ------
+    UserError
+        If the method fails, or does not support the scene.
+    """
+    with TemporaryDirectory(prefix="matbench-") as folder, without_main(), kernels_kept():
+        views, heard = Path(folder) / "views.npz", Path(folder) / "told.npz"
+        views_only.write(scene, views)
+        processes.start_server([__name__])
+        line, theirs = Pipe(duplex=False)
+        process = get_context("forkserver").Process(target=_solve, args=(theirs, cell, files, views, heard, wanted))
+        process.start()
+        theirs.close()
+        try:
+            said = line.recv_bytes().decode()
+        except EOFError:
+            said = "its process has ended"
+        process.join()
+        if said:
+            raise UserError(f"{cell}: {said}")
+        return told.read(heard)
+
+
+def _solve(line: Connection, cell: Cell, files: Sequence[Path], views: Path, heard: Path, wanted: RecordOption) -> None:
+    """In the new process: solve, write what was told, and say what went wrong."""
+    os.environ[views_only.VARIABLE] = "1"
+    said = ""
+    try:
+        scene, threads = views_only.read(views), limits.cores()
+        processes.use_threads(threads)
+        plugin = plugins.algorithm(cell.method.algorithm, files)
+        method = spec.build(plugin.name, plugin.load(), cell.method.params)
+        if reason := plugins.unsupported(method, scene):
+            said = f"was skipped: {reason}"
+        else:
+            probe = CapturingProbe(wanted.at(scene.height))
+            estimate = method.solve(scene, Context(cell.seed, threads, probe))
+            told.write(heard, told.Told(probe, Estimate(checked(estimate, scene), estimate.volume)))
+    except BaseException as error:  # whatever a method raises
+        said = f"{type(error).__name__}: {first_line(error)}"
+    line.send_bytes(said.encode("utf-8", "replace"))
