@@ -73,16 +73,11 @@ def slice_(
     cell
         Part of the cell's name or key; not needed where there is only one.
     """
-    from matbench import spec
-    from matbench.algorithm import Context
     from matbench.plans import plugins
-    from matbench.plans.limits import cores
     from matbench.plans.record_option import RecordOption
-    from matbench.recording.probe import CapturingProbe
     from matbench.reports import slice_figure
     from matbench.runs.store import Store
-    from matbench.scenes.views_only import without_truth
-    from matbench.solving.worker import checked
+    from matbench.solving.listening import listen
 
     store, console = Store(run), Console()
     plan = store.plan()
@@ -96,25 +91,17 @@ def slice_(
         raise UserError(
             f"{chosen.method.algorithm} is in a file of its own: add --plugin {shlex.join(plan.plugin_files)}"
         )
-    found = plugins.algorithm(chosen.method.algorithm, plugin)
-    method = spec.build(found.name, found.load(), chosen.method.params)
     scene = _scene(chosen, data, console)
     if wanted.rows and wanted.rows[0] >= scene.height:
         raise UserError(f"row {row} of {scene.name}: 0 to {scene.height - 1} is possible")
     stem = _stem(out, run, f"slice-{chosen}")
-    unsupported = getattr(method, "unsupported_reason", None)
-    if unsupported and (reason := unsupported(scene)):
-        raise UserError(f"{chosen} was skipped: {reason}")
-    probe = CapturingProbe(wanted.at(scene.height))
     with console.status(f"{chosen}: solving once more"):
-        hidden = without_truth(scene)
-        estimate = method.solve(hidden, Context(chosen.seed, cores(), probe))
-        answer = checked(estimate, hidden)
-    plane = slice_figure.epipolar_plane(scene, probe, estimate)
+        told = listen(chosen, plugin, scene, wanted.at(scene.height))
+    plane = slice_figure.epipolar_plane(scene, told.probe, told.estimate)
     if plane is None:
         raise UserError(f"{chosen.method} tells nothing of disparity space: no volume, no similarities")
     stored = _stored(store, chosen, scene)
-    if stored is not None and not np.array_equal(stored, answer[scene.ref], equal_nan=True):
+    if stored is not None and not np.array_equal(stored, told.estimate.disparity[scene.ref], equal_nan=True):
         console.say("the answer differs from the stored one: the code has changed since the run, or was not repeatable")
     with console.status("drawing"):
         _write(slice_figure.draw(scene, plane, str(chosen.method), width), stem, console)

@@ -18,7 +18,7 @@ from matbench.recording.probe import CapturingProbe
 from matbench.scene import Scene
 from matbench.scenes import views_only
 from matbench.solving import processes
-from matbench.solving.environment import kernels_kept, without_main
+from matbench.solving.environment import kernel_cache_in_use, without_main
 from matbench.solving.worker import checked
 from matbench.spec import first_line
 
@@ -31,7 +31,7 @@ def listen(cell: Cell, files: Sequence[Path], scene: Scene, wanted: RecordOption
     UserError
         If the method fails, or does not support the scene.
     """
-    with TemporaryDirectory(prefix="matbench-") as folder, without_main(), kernels_kept():
+    with TemporaryDirectory(prefix="matbench-") as folder, without_main(), kernel_cache_in_use():
         views, heard = Path(folder) / "views.npz", Path(folder) / "told.npz"
         views_only.write(scene, views)
         processes.start_server([__name__])
