@@ -28,6 +28,7 @@ from matbench.runs.store import FolderLost, Outcome, Store
 from matbench.scene import NotInScene, Scene
 from matbench.scenes.catalogue import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
 from matbench.scenes.dataset import Listing
+from matbench.scenes.scene_check import beyond_range
 from matbench.solving import run
 
 if TYPE_CHECKING:
@@ -63,6 +64,11 @@ class Comparison:
     @property
     def folder(self) -> Path:
         return self.store.folder
+
+    @property
+    def remarks(self) -> list[str]:
+        """What readers of the scores should know of the scenes, a line each."""
+        return [f"{name}: {said}" for name, scene in self.scenes.items() if (said := beyond_range(scene))]
 
     def run(self, listen: run.Listener | None = None) -> None:
         """Compute what is not done yet.
@@ -187,6 +193,8 @@ class Comparison:
             facts["not repeatable"] = "; ".join(differing)
         if note := tables.timing_note(cells):
             facts["times"] = note
+        if self.remarks:
+            facts["ranges"] = "; ".join(self.remarks)
         return facts
 
 

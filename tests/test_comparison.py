@@ -56,6 +56,18 @@ def test_results_are_tidy_and_exact(tmp_path: Path) -> None:
     assert set(results.params) == {"value=2.0"}
 
 
+def test_truth_beyond_a_range_is_told_once_for_each_scene(tmp_path: Path) -> None:
+    narrow = "synthetic/box[disparities=0:3 size=96x72]"
+    scene = matbench.load_scene(narrow)
+    beyond = int((scene.truth[scene.ref].astype(float) * scene.pair_steps > 3).sum())
+    assert 0 < beyond < scene.height * scene.width
+    ready = comparison.prepare("flat", [SMALL, narrow], plugin=[METHODS], out=tmp_path / "run")
+    (remark,) = ready.remarks
+    assert remark.startswith(f"{scene.name}: {beyond} of {scene.height * scene.width} pixels")
+    ready.run()
+    assert remark in ready.report(*ready.tables()).read_text("utf-8")
+
+
 def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
     bad = ["exits", "leaves", "raises", "writes", "misshapen", "bare", "peeks", "declines"]
     results = compare(tmp_path, *bad, "flat")

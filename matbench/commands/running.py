@@ -66,6 +66,8 @@ def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
     voice = Voice.of(options)
     for reason, scenes in ready.left_out.items():
         voice.say(f"without {', '.join(scenes)}: {reason}")
+    for remark in ready.remarks:
+        voice.say(remark)
     if ready.settings.dask is None and (crowd := crowded(ready.settings.jobs, ready.settings.threads_each())):
         voice.say(crowd)
     with locked(ready.folder), _ended_as_by_ctrl_c():
@@ -104,6 +106,8 @@ def show_plan(ready: Comparison, options: Options) -> int:
     console = Console()
     for reason, scenes in ready.left_out.items():
         console.say(f"without {', '.join(scenes)}: {reason}")
+    for remark in ready.remarks:
+        console.say(remark)
     console.say(f"{total - len(todo)} of {total} cells stay as they are in {ready.folder}, {len(todo)} would run")
     for cell, why in todo:
         console.say(f"  {cell}: {why}")

@@ -18,7 +18,7 @@ Verdict = Literal["good", "note", "problem", "unknown"]
 NOTED_ROWS, WRONG_ROWS = 0.5, 1.0  # px of vertical misalignment
 NOTED_STEP, WRONG_STEP = 0.12, 0.3  # of a view step, from the view's place
 IN_RANGE = 0.9  # share of matched features that the range must hold
-KNOWN_IN_RANGE = 0.98  # share of the truth
+LARGEST_BEYOND = 0.02  # share of the truth that may lie outside the range; all of it is told
 LEAST_SEEN = 0.1  # share of the truth's points that the other views see, together
 NOTED_SHIFT = 0.5  # px of the pair, from where the truth explains the views best
 CLEARLY = 0.9  # of the warping error: a rival that leaves less explains the views better
@@ -161,18 +161,12 @@ def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
 
 def _truth(scene: Scene, name: str) -> Iterator[Finding]:
     topic = f"truth of {name}"
-    truth = scene.truth[scene.ref]
-    known = truth[np.isfinite(truth)]
-    margin = 0.5 / scene.pair_steps
-    held = np.mean((known >= scene.disparities.least - margin) & (known <= scene.disparities.largest + margin))
-    if held < KNOWN_IN_RANGE:
-        ends = f"{known.min():g} .. {known.max():g}"
-        text = (
-            f"{100 * (1 - held):.0f} % of it lies outside the range {scene.disparities}: it is {ends} px per view step"
-        )
-        yield Finding(topic, "problem", text)
+    known = np.count_nonzero(np.isfinite(scene.truth[scene.ref]))
+    if beyond := beyond_range(scene):
+        share = np.count_nonzero(scene.out_of_range) / known
+        yield Finding(topic, "problem" if share > LARGEST_BEYOND else "note", beyond)
     error = together(warping_errors(scene))
-    if error is None or error.pixels < LEAST_SEEN * (scene.n - 1) * known.size:
+    if error is None or error.pixels < LEAST_SEEN * (scene.n - 1) * known:
         yield Finding(topic, "problem", "it leads out of the other views nearly everywhere: is its scale right?")
         return
     at = error.mean
@@ -187,6 +181,22 @@ def _truth(scene: Scene, name: str) -> Iterator[Finding]:
         best = _vertex(error)
         text = f"; {best:+.1f} px would explain them best" if abs(best) > NOTED_SHIFT else ""
         yield Finding(topic, "note" if text else "good", said + text)
+
+
+def beyond_range(scene: Scene) -> str | None:
+    """How much of the reference view's truth lies outside the range that is searched, in words; None if nothing does.
+
+    Whatever little it is, it is told: a method that keeps to the range is wrong there, however good it is.
+    """
+    beyond = int(np.count_nonzero(scene.out_of_range))
+    if not beyond:
+        return None
+    truth = scene.truth[scene.ref]
+    known = truth[np.isfinite(truth)]
+    return (
+        f"{beyond} of {known.size} pixels of known truth ({100 * beyond / known.size:.2f} %) lie outside the range "
+        f"{scene.disparities}, where no method searches: truth is {known.min():g}..{known.max():g} px per view step"
+    )
 
 
 def _vertex(error: WarpingError) -> float:

@@ -86,6 +86,14 @@ def test_a_range_that_does_not_hold_the_scene_is_told(scene: Scene) -> None:
     assert all("outside the range 0..3" in finding.text for finding in found)
 
 
+def test_a_single_pixel_beyond_the_range_is_told(scene: Scene) -> None:
+    truth = scene.truth[scene.ref].copy()
+    truth[50, 60] = scene.disparities.largest + 0.25
+    found = [finding for finding in check(evolve(scene, truth={scene.ref: truth})) if finding.verdict != "good"]
+    assert [(finding.topic, finding.verdict) for finding in found] == [(f"truth of {scene.ref}", "note")]
+    assert f"1 of {truth.size} pixels" in found[0].text
+
+
 @pytest.mark.parametrize(("down", "turn"), [(2.0, 0.0), (-1.5, 0.0), (0.0, 1.0)])
 def test_views_that_are_not_rectified_are_told(scene: Scene, down: float, turn: float) -> None:
     views = scene.views.copy()
