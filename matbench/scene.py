@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from matbench.errors import UserError
 
-
 _ROUNDING = 1e-4  # px of the pair: float32 rounding does not decide what is in the range
 
 
