@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from matbench import spec
 from matbench.errors import UserError, unknown
 from matbench.files.writing import write_text
+from matbench.measures.prediction import instead_of_truth
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan, make_plan, methods
@@ -290,7 +291,7 @@ def prepare(
         if scene.ref not in scene.truth and scene.held_out is None:
             ref = scene.labels[scene.ref]
             raise UserError(
-                f"{name} has no ground truth of its reference view {ref}: only [predict=left] or [predict=right]"
+                f"{name} has no ground truth of its reference view {ref}: it needs {instead_of_truth(scene)}"
             )
         for row in rows:
             if not 0 <= row < scene.height:

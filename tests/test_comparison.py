@@ -95,6 +95,24 @@ def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
     assert "ArithmeticError" in log
 
 
+def test_what_fails_says_what_where_and_where_its_log_is(tmp_path: Path) -> None:
+    plugin = tmp_path / "opens.py"
+    plugin.write_text(
+        "class Opens:\n    def solve(self, scene, context):\n        return open('/nowhere/weights.bin')\n\n"
+        "class Calls:\n    def solve(self, scene, context):\n        import subprocess\n"
+        "        return subprocess.run(['false'], check=True)\n"
+    )
+    matbench.compare(["opens", "calls"], SMALL, out=tmp_path / "run", plugin=plugin)
+    found = cells(tmp_path)
+    for name, reason in {
+        "opens": "FileNotFoundError: [Errno 2] No such file or directory: '/nowhere/weights.bin' (opens.py:3)",
+        "calls": "CalledProcessError: Command '['false']' returned non-zero exit status 1. (opens.py:8)",
+    }.items():
+        log = f"cells/{found.cell[name]}/log.txt"
+        assert (found.status[name], found.reason[name]) == ("failed", f"{reason} (log: {log})")
+        assert "Traceback" in (tmp_path / "run" / log).read_text()
+
+
 def test_an_empty_map_is_totally_bad(tmp_path: Path) -> None:
     results = compare(tmp_path, "empty")
     every = results[results.region == "all"].set_index("metric").value

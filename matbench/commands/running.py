@@ -150,11 +150,10 @@ def _say_paths(ready: Comparison, written: dict[str, Path], voice: Voice) -> Non
     for what, path in written.items():
         voice.say(f"{what}: {path}")
     if any(ready.folder.glob("cells/*/recording.rrd")):
-        voice.say(f"recordings: matbench view {ready.folder}")
+        voice.say(f"recordings: matbench view {shlex.quote(str(ready.folder))}")
     if stale := len(ready.store.stale(ready.plan)):
-        voice.say(
-            f"{stale} stored cells are of other code or pixels: matbench status {ready.folder} --prune removes them"
-        )
+        prune = shlex.join(["matbench", "status", str(ready.folder), "--prune"])
+        voice.say(f"{stale} stored cells are of other code or pixels: {prune} removes them")
 
 
 def document(

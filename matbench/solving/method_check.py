@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.algorithm import Context
+from matbench.errors import failure
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import limits, plugins
 from matbench.plans.plan import Method
@@ -27,11 +28,9 @@ from matbench.scenes.catalogue import load_scene
 from matbench.solving import processes
 from matbench.solving.environment import kernels_kept, without_main
 from matbench.solving.worker import checked, hide_truth
-from matbench.spec import first_line
 
 Verdict = Literal["pass", "fail", "skipped", "note"]
 
-HARNESS = Path(__file__).parents[1]
 _TICK = 0.05  # seconds between two looks at a process
 ALIKE = 0.99  # share of a map's pixels that must agree
 EASY, EITHER_SIGN = "synthetic/box[n=5 ref=1]", "synthetic/curved[n=5 ref=1]"
@@ -206,14 +205,7 @@ def solve(method: Method, files: Sequence[Path], trial: Trial, log: Path) -> Ans
             return Answer(maps, digest, infinite, touched)
         except BaseException as error:  # whatever a method raises, SystemExit included
             traceback.print_exc()
-            return Answer(error=f"{type(error).__name__}: {first_line(error)}{_where(error)}")
-
-
-def _where(error: BaseException) -> str:
-    """The line of the method, or of what it calls, that raised; nothing where the harness did."""
-    frames = [(Path(one.filename), one.lineno) for one in traceback.extract_tb(error.__traceback__)]
-    outside = [f" ({path.name}:{line})" for path, line in frames if path.parent.parent != HARNESS]
-    return outside[-1] if outside else ""
+            return Answer(error=f"{failure(error)}")
 
 
 def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Path], trial: Trial, log: Path) -> None:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.algorithm import Algorithm, Context, Estimate
-from matbench.errors import UserError
+from matbench.errors import UserError, failure, one_line
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell
@@ -30,7 +30,6 @@ from matbench.runs.store import FINAL, Outcome, Status, write_cell
 from matbench.scene import Scene
 from matbench.scenes.catalogue import load_scene
 from matbench.solving import processes
-from matbench.spec import first_line
 
 _TINY = 16, 64  # rows and columns of the scene that methods are compiled on
 
@@ -122,7 +121,7 @@ def _volume(estimate: Estimate, scene: Scene) -> StoredVolume | None:
         if volume.views[-1] >= scene.n or (volume.space.rows, volume.space.width) != (scene.height, scene.width):
             raise ValueError(f"the volume spans the views {volume.views} of {volume.space}, which is another scene")
     except (ValueError, TypeError, AttributeError) as error:
-        print(f"volume not kept: {type(error).__name__}: {error}")
+        print(f"volume not kept: {failure(error)}")
         return None
     return volume
 
@@ -170,7 +169,7 @@ def _record(method: Algorithm, job: Job, path: Path, outcome: Outcome) -> Outcom
         record(path, scene, solve, title=str(job.cell), wanted=wanted)
     except Exception as error:
         traceback.print_exc()
-        return evolve(outcome, reason=f"not recorded: {type(error).__name__}: {first_line(error)}")
+        return evolve(outcome, reason=f"not recorded: {failure(error)}")
     return evolve(outcome, recorded=wanted)
 
 
@@ -208,12 +207,11 @@ def run_cell(job: Job, draft: Path) -> Outcome:
 
 
 def _what_failed(error: BaseException) -> tuple[Status, str]:
-    if isinstance(error, MemoryError):
-        return "out-of-memory", f"MemoryError: {error}"
-    reason = f"{type(error).__name__}: {first_line(error)}"
+    reason = failure(error)
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", reason
-    is_memory = any(words in str(error).lower() for words in ("insufficient memory", "cannot allocate memory"))
+    said = one_line(error).lower()
+    is_memory = isinstance(error, MemoryError) or "insufficient memory" in said or "cannot allocate memory" in said
     return "out-of-memory" if is_memory else "failed", reason
 
 
