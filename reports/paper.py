@@ -136,8 +136,10 @@ def sheet(
     Raises
     ------
     UserError
-        If nothing was scored by that metric, or in one of the regions.
+        If nothing was scored at all, by that metric, or in one of the regions.
     """
+    if results.empty:
+        raise UserError(tables.none_scored(cells))
     results, cells = tables.labelled(results), tables.labelled(cells)
     units = tables.metrics(results)
     if metric not in units:

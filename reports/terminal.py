@@ -41,7 +41,7 @@ def tables(
     """
     scope = shared(results, cells)
     out = []
-    if scope.methods:
+    if scope.methods and len(results):
         heads = {f"{metric} {r}": r.replace("textureless", "texture-\nless") for r in REGIONS}
         heads |= {"avg all": "avg\nall", "seconds": "time"}
         if width < WIDTH:

@@ -84,7 +84,10 @@ def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
         "flat": "ok",
     }
     assert "exit status 7" in found.reason["exits"]
-    assert found.reason["raises"] == "ArithmeticError: the third digit is missing"
+    line = 1 + next(k for k, said in enumerate(METHODS.read_text().splitlines()) if "third digit" in said)
+    log = f"cells/{found.cell['raises']}/log.txt"
+    said = "ArithmeticError: the third digit is missing and more"
+    assert found.reason["raises"] == f"{said} (methods.py:{line}) (log: {log})"
     assert "read-only" in found.reason["writes"]
     assert "(72, 96)" in found.reason["misshapen"]
     assert "ndarray, not an Estimate" in found.reason["bare"]

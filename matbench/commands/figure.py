@@ -11,7 +11,7 @@ from cyclopts import App, Parameter
 
 from matbench.commands.console import DONE, Console
 from matbench.commands.options import Data, Plugins
-from matbench.errors import UserError
+from matbench.errors import UserError, failure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -107,8 +107,11 @@ def slice_(
     probe = RecordingProbe(wanted.at(scene.height))
     with console.status(f"{chosen}: solving once more"):
         hidden = hide_truth(scene)
-        estimate = method.solve(hidden, Context(chosen.seed, cores(), probe))
-        answer = checked(estimate, hidden)
+        try:
+            estimate = method.solve(hidden, Context(chosen.seed, cores(), probe))
+            answer = checked(estimate, hidden)
+        except Exception as error:  # whatever a method raises
+            raise UserError(f"{chosen} failed: {failure(error)}") from error
     plane = slices.epipolar_plane(scene, probe, estimate)
     if plane is None:
         raise UserError(f"{chosen.method} tells nothing of disparity space: no volume, no similarities")
@@ -167,9 +170,8 @@ def maps(
     scenes: dict[str, Scene] = {}
     found: dict[tuple[str, str], NDArray[np.float32]] = {}
     with console.status("reading") as status:
-        for cell in cells:
-            if cell.scene not in names or str(cell.method) not in methods:
-                continue
+        chosen = [cell for cell in cells if cell.scene in names and str(cell.method) in methods]
+        for cell in chosen:
             if cell.scene not in scenes:
                 status.update(f"{cell.scene}: reading")
                 scenes[cell.scene] = _scene(cell, data, console)
@@ -177,6 +179,8 @@ def maps(
             stored = _stored(store, cell, known)
             if stored is not None and stored.shape == (known.height, known.width):
                 found.setdefault((str(cell.method), cell.scene), stored)
+    if not found:
+        raise UserError(f"no disparity map to draw: {_lacking(store, chosen)}")
     with console.status("drawing"):
         drawn = figure.draw(figure.Maps(tuple(scenes[n] for n in names), tuple(methods), found), width, errors)
         _write(drawn, stem, console)
@@ -224,6 +228,13 @@ def _stored(store: "Store", cell: "Cell", scene: "Scene") -> "NDArray[np.float32
     if outcome is None or outcome.status != "ok":
         return None
     return store.disparity(cell).get(scene.ref)
+
+
+def _lacking(store: "Store", cells: "Sequence[Cell]") -> str:
+    """What became of cells of which none has a map: how many there are, and the first one's reason."""
+    outcome = store.outcome(cells[0])
+    became = "not computed yet" if outcome is None else f"{outcome.status} {outcome.reason}".strip()
+    return f"none of {len(cells)} cells is ok; {cells[0]}: {became}"
 
 
 def _stem(out: Path | None, run: Path, name: str) -> Path:

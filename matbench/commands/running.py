@@ -139,6 +139,8 @@ def publish(
         print(ready.folder)
     else:
         _print_tables(results, cells, switches, sweeps, metric, voice.talk)
+        if results.empty:
+            voice.say(tables.none_scored(cells))
         for line in unsteady(ready.plan, ready.store):
             voice.say(f"does not repeat itself: {line}")
         if say_paths:

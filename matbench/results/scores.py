@@ -164,7 +164,8 @@ def reliabilities(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.D
 def _log_of(store: Store, cell: Cell) -> str:
     """Where a cell's log lies in the run folder, to stand after its reason; nothing if it has none."""
     log = store.cell(cell) / "log.txt"
-    return f" (log: {log.relative_to(store.folder).as_posix()})" if log.is_file() else ""
+    printed = log.is_file() and log.stat().st_size > 0
+    return f" (log: {log.relative_to(store.folder).as_posix()})" if printed else ""
 
 
 def cells(plan: Plan, store: Store) -> pd.DataFrame:
