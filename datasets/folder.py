@@ -15,6 +15,7 @@ Nothing outside the folder is read, whatever the file says.
 """
 
 import re
+import shlex
 import tomllib
 from collections.abc import Mapping, Sequence
 from math import isfinite
@@ -23,11 +24,10 @@ from typing import Any
 
 from matbench.datasets.pair import CALIBRATION, pair
 from matbench.datasets.stored import StoredScene, TruthFile, inside
-from matbench.errors import UserError, unknown
+from matbench.errors import UserError, one_line, unknown
 from matbench.files.images import encoding, read_bytes
 from matbench.scene import Range, Scene
 from matbench.scenes.dataset import Listing
-from matbench.spec import first_line
 
 TOML = "scene.toml"
 _FARTHEST = 9999  # pixels per view step, far beyond the width of images
@@ -68,7 +68,7 @@ def describe(called: str) -> StoredScene:
         return pair(called, folder)
     raise UserError(
         f"folder {called!r} holds no scene: neither {TOML} nor {CALIBRATION} is in it; "
-        f"'matbench scene new {called}' writes a {TOML} for its images"
+        f"{shlex.join(['matbench', 'scene', 'new', called])} writes a {TOML} for its images"
     )
 
 
@@ -119,7 +119,7 @@ def _parsed(path: Path) -> dict[str, Any]:
     except RecursionError:
         raise UserError(f"{path} is not TOML: it is nested too deeply") from None
     except ValueError as error:
-        raise UserError(f"{path} is not TOML: {first_line(error)}") from None
+        raise UserError(f"{path} is not TOML: {one_line(error)}") from None
 
 
 def _said(value: object) -> str:

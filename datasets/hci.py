@@ -15,11 +15,10 @@ from configparser import Error as ConfigError
 from pathlib import Path
 
 from matbench.datasets.stored import StoredScene, TruthFile
-from matbench.errors import UserError, unknown
+from matbench.errors import UserError, one_line, unknown
 from matbench.files.images import read_bytes
 from matbench.scene import Range, Scene
 from matbench.scenes.dataset import Listing
-from matbench.spec import first_line
 
 SIDE, SIZE = 9, (512, 512)
 
@@ -139,7 +138,7 @@ def read_range(folder: Path) -> Range:
     except UnicodeDecodeError:
         raise UserError(f"parameters {path} are no text (UTF-8)") from None
     except ConfigError as error:
-        raise UserError(f"parameters {path} cannot be read: {first_line(error)}") from None
+        raise UserError(f"parameters {path} cannot be read: {one_line(error)}") from None
     bounds = []
     for key in ("disp_min", "disp_max"):
         text = parser.get("meta", key, fallback="")

@@ -23,6 +23,7 @@ _IMAGES = (".png", ".ppm", ".pgm")
 _NOT_READ = (".bmp", ".exr", ".gif", ".jpeg", ".jpg", ".tif", ".tiff", ".webp")
 _NO_VIEW = re.compile(r"disp(?!lay)|depth|truth|mask|n?o?nocc|(^|[^a-z])gt([^a-z]|$)", re.IGNORECASE)
 _MEASURED = 24  # at most so many views are matched; order is told only where that is all of them
+_COLOURS = 8  # a picture that has no more is a mask
 _SURE = 40  # matched features from which a range is guessed
 _MARGIN = 0.5  # of the largest measured disparity: few features lie on what is nearest
 _OUT_OF_ORDER = 0.3  # of a view step
@@ -66,7 +67,13 @@ def write(folder: Path, disparities: tuple[float, float] | None = None, replace:
             raise UserError(f"{folder} is a scene already: it holds {known}; --force writes {TOML} all the same")
     given = None if disparities is None else Range(*disparities)
     names, remarks = _views(folder)
-    order, measured, notes = _measure([read_rgb(folder / name) for name in names])
+    images = {name: read_rgb(folder / name) for name in names}
+    masks = [name for name, image in images.items() if _is_mask(image)]
+    if len(masks) < len(names):  # where all look so, they are random dots, say
+        names = [name for name in names if name not in masks]
+        remarks += [f"left out: {name}, a mask: it has no more than {_COLOURS} colours" for name in masks]
+        _check_count(folder, names)
+    order, measured, notes = _measure(names, [images[name] for name in names])
     names = [names[index] for index in order]
     chosen = given or measured or Range(0, max(1, read_size(folder / names[0])[0] // (8 * (len(names) - 1))))
     if given is None:
@@ -101,13 +108,7 @@ def _views(folder: Path) -> tuple[list[str], list[str]]:
             remarks.append(f"left out: {error}")
         except UnicodeEncodeError:
             remarks.append(f"left out: {name!r}, whose name is no text")
-    if len(sizes) < 2:
-        found = ", ".join(sizes) or "none"
-        others = sorted({path.suffix for path in folder.iterdir() if path.suffix.lower() in _NOT_READ})
-        hint = f"; {', '.join(others)} are not read: save them as PNG" if others else ""
-        raise UserError(
-            f"{folder} has too few images: at least two views (PNG, or binary PPM or PGM), found: {found}{hint}"
-        )
+    _check_count(folder, list(sizes))
     size = Counter(sizes.values()).most_common(1)[0][0]
     names = [name for name in sizes if sizes[name] == size]
     remarks += [f"left out: {name}, {w}x{h} px" for name, (w, h) in sizes.items() if (w, h) != size]
@@ -116,14 +117,40 @@ def _views(folder: Path) -> tuple[list[str], list[str]]:
     return names, remarks
 
 
-def _measure(images: Sequence[NDArray[np.uint8]]) -> tuple[list[int], Range | None, list[str]]:
+def _check_count(folder: Path, names: Sequence[str]) -> None:
+    """Refuse fewer than two views."""
+    if len(names) < 2:
+        found = ", ".join(names) or "none"
+        others = sorted({path.suffix for path in folder.iterdir() if path.suffix.lower() in _NOT_READ})
+        hint = f"; {', '.join(others)} are not read: save them as PNG" if others else ""
+        raise UserError(
+            f"{folder} has too few images: at least two views (PNG, or binary PPM or PGM), found: {found}{hint}"
+        )
+
+
+def _is_mask(image: NDArray[np.uint8]) -> bool:
+    """Has an image hardly any colours?"""
+    for part in (image[::16], image):  # of a photograph, a few rows tell
+        packed = part.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+        if len(np.unique(packed)) > _COLOURS:
+            return False
+    return True
+
+
+def _measure(names: Sequence[str], images: Sequence[NDArray[np.uint8]]) -> tuple[list[int], Range | None, list[str]]:
     """Indices from left to right, the range of disparities, and what was found."""
     count, ref = min(len(images), _MEASURED), (min(len(images), _MEASURED) - 1) // 2
     matches = alignment.match(np.stack(images[:count]), ref)
     places = alignment.places(matches, count, ref)
     given = list(range(len(images)))
     if places is None or not np.isfinite(places).all():
-        return given, None, ["the order of the views is that of their names: too few features match to measure it"]
+        strange = (
+            []
+            if places is None
+            else [name for name, place in zip(names, places, strict=False) if not np.isfinite(place)]
+        )
+        match = f"match in {', '.join(strange)}: are these views of this scene?" if strange else "match to measure it"
+        return given, None, [f"the order of the views is that of their names: too few features {match}"]
     found = alignment.disparities(matches, places)
     order, notes = given, []
     if len(found) and np.median(found) < 0 and np.mean(found < 0) > 0.9:  # nearer is larger, mostly beyond 0

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from matbench import spec
 from matbench.errors import UserError, unknown
 from matbench.files.writing import write_text
+from matbench.measures.prediction import instead_of_truth
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan, make_plan, methods
@@ -28,6 +29,7 @@ from matbench.runs.store import FolderLost, Outcome, Store
 from matbench.scene import NotInScene, Scene
 from matbench.scenes.catalogue import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
 from matbench.scenes.dataset import Listing
+from matbench.scenes.scene_check import beyond_range
 from matbench.solving import run
 
 if TYPE_CHECKING:
@@ -63,6 +65,11 @@ class Comparison:
     @property
     def folder(self) -> Path:
         return self.store.folder
+
+    @property
+    def remarks(self) -> list[str]:
+        """What readers of the scores should know of the scenes, a line each."""
+        return [f"{name}: {said}" for name, scene in self.scenes.items() if (said := beyond_range(scene))]
 
     def run(self, listen: run.Listener | None = None) -> None:
         """Compute what is not done yet.
@@ -188,6 +195,8 @@ class Comparison:
             facts["not repeatable"] = "; ".join(differing)
         if note := tables.timing_note(cells):
             facts["times"] = note
+        if self.remarks:
+            facts["ranges"] = "; ".join(self.remarks)
         return facts
 
 
@@ -293,7 +302,7 @@ def prepare(
         if scene.ref not in scene.truth and scene.held_out is None:
             ref = scene.labels[scene.ref]
             raise UserError(
-                f"{name} has no ground truth of its reference view {ref}: only [predict=left] or [predict=right]"
+                f"{name} has no ground truth of its reference view {ref}: it needs {instead_of_truth(scene)}"
             )
         for row in rows:
             if not 0 <= row < scene.height:

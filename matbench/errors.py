@@ -1,7 +1,18 @@
-"""Errors that a user can put right."""
+"""The one kind of error that a user can put right, and what any other error says, in one line."""
 
+import re
+import sysconfig
+import traceback
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
+from subprocess import CalledProcessError
+
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")  # as compilers print them
+_HARNESS = Path(__file__).parent
+_METHODS = _HARNESS / "algorithms"
+_LIBRARIES = {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+_INSTALLED = {"site-packages", "dist-packages"}
 
 
 class UserError(Exception):
@@ -31,3 +42,57 @@ def unknown(kind: str, value: str, possible: Iterable[str]) -> UserError:
     hint = f"did you mean {near[0]!r}? " if near else ""
     noun, blank, of_what = kind.partition(" ")
     return UserError(f"unknown {noun} {value!r}{blank}{of_what}: {hint}Possible: {', '.join(names) or 'none'}")
+
+
+def one_line(error: BaseException) -> str:
+    """All that an exception says, in one line; its type where it says nothing.
+
+    It is ``str(error)``, not the first argument: that of an `OSError` is a number, that of a
+    `UnicodeDecodeError` the name of a codec. Of a program that was called, the last line that it printed as an
+    error is told, too, where it was caught.
+
+    >>> one_line(FileNotFoundError(2, "No such file or directory", "left.png"))
+    "[Errno 2] No such file or directory: 'left.png'"
+    >>> one_line(ValueError("two\\nlines"))
+    'two lines'
+    >>> one_line(AssertionError())
+    'AssertionError'
+    """
+    # unlike str(), it never raises, whatever a method's own exception does
+    said = str(traceback.TracebackException(type(error), error, None, lookup_lines=False))
+    if isinstance(error, CalledProcessError) and error.stderr:
+        printed = error.stderr if isinstance(error.stderr, str) else error.stderr.decode("utf-8", "replace")
+        said += f" It printed: {(printed.splitlines() or [''])[-1]}"
+    plain = "".join(c if c.isprintable() else " " for c in _COLOURS.sub("", said))
+    return " ".join(plain.split()) or type(error).__name__
+
+
+def where(error: BaseException) -> str:
+    """``file.py:12``: the line of the user's code in which an exception was raised or which led to it.
+
+    It is the last one that belongs neither to the harness nor to an installed library; empty if there is none.
+    Built-in methods are no part of the harness here.
+    """
+    lines = [(Path(one.filename), one.lineno) for one in traceback.extract_tb(error.__traceback__)]
+    own = [(path, line) for path, line in lines if not (_is_harness(path) or _is_library(path))]
+    return f"{own[-1][0].name}:{own[-1][1]}" if own else ""
+
+
+def failure(error: BaseException) -> str:
+    """An exception's type, all that it says and where it came from, in one line; a `UserError` says enough."""
+    said, kind, place = one_line(error), type(error).__name__, where(error)
+    if isinstance(error, UserError):
+        return said
+    return (said if said == kind else f"{kind}: {said}") + (f" ({place})" if place else "")
+
+
+def _is_harness(path: Path) -> bool:
+    return path.is_relative_to(_HARNESS) and not path.is_relative_to(_METHODS)
+
+
+def _is_library(path: Path) -> bool:
+    """Is it a file of Python's own library, or of an installed distribution other than this one?"""
+    if path.is_relative_to(_HARNESS):
+        return False
+    is_installed = bool(_INSTALLED.intersection(path.parts)) or any(map(path.is_relative_to, _LIBRARIES))
+    return is_installed or path.name.startswith("<")  # "<frozen importlib._bootstrap>"

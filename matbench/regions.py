@@ -22,6 +22,9 @@ JUMP, JUMP_WIDTH = 2.0, 9
 TEXTURE, TEXTURE_WIDTH = 4.0, 3
 """Grey levels: below this horizontal gradient there is no texture; px: width of the window."""
 
+LEAST_SHARE, LEAST_PIXELS = 0.005, 100
+"""Of the scene's known truth, and pixels: regions of a scene that hold less do not enter means over scenes."""
+
 _ROUNDING = 1e-4  # px: as for the scores, float32 rounding does not decide a tie
 
 Mask = NDArray[np.bool_]
@@ -77,6 +80,28 @@ def regions(
         "disc": nonocc & near_jumps(truth * np.float32(abs(partner)), occ),
         "textureless": nonocc & textureless(image),
     }
+
+
+def counts(pixels: int, known: int) -> bool:
+    """Does a region of a scene enter the means over scenes, where it weighs as much as any other?
+
+    A share of few pixels is noise: of one pixel it is 0 or 100 %, and below `LEAST_PIXELS` each of them is
+    more than a per cent. Below `LEAST_SHARE` of the scene, what a region holds is strips and specks that hang on
+    the rounding of its truth. The whole scene always counts.
+
+    Parameters
+    ----------
+    pixels
+        The region's, with known truth.
+    known
+        All of the scene's, with known truth: those of region ``all``.
+
+    >>> counts(1, 43200), counts(215, 43200), counts(216, 43200), counts(34230, 43200)
+    (False, False, True, True)
+    >>> counts(60, 6912), counts(50, 50), counts(0, 0)
+    (False, True, False)
+    """
+    return pixels > 0 and (pixels == known or pixels >= max(LEAST_PIXELS, LEAST_SHARE * known))
 
 
 def points_seen(truth: NDArray[np.float32], steps: float) -> Mask:

@@ -68,7 +68,7 @@ def open_run(
     scenes = Scenes.of(plan, root)
     if scenes.missing and not (partial and scenes.found):
         said = "; ".join(f"{name}: {why}" for name, why in scenes.missing.items())
-        hint = "" if partial else "; --partial scores the other scenes"
+        hint = "" if partial or not scenes.found else "; --partial scores the other scenes"
         raise UserError(f"{len(scenes.missing)} of {len(scenes.missing) + len(scenes.found)} scenes: {said}{hint}")
     kept = tuple(cell for cell in plan.cells if cell.scene in scenes.found)
     spellings = {name: of for name, of in plan.spellings.items() if of in scenes.found}

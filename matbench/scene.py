@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from matbench.errors import UserError
 
+_ROUNDING = 1e-4  # px of the pair: float32 rounding does not decide what is in the range
+
 
 class SceneError(UserError):
     """A scene that contradicts itself, or a choice of views that it cannot give."""
@@ -198,6 +200,14 @@ class Scene:
             return self.regions
         over_views = view_regions(self.truth[self.ref], self.ref, self.n, self.visible.get(self.ref))
         return _frozen_arrays({**self.regions, **over_views})
+
+    @property
+    def out_of_range(self) -> NDArray[np.bool_]:
+        """(H, W): where the reference view's truth lies outside `disparities`, so that no search can find it."""
+        if self.ref not in self.truth:
+            return np.zeros((self.height, self.width), bool)
+        truth, rounding = self.truth[self.ref], _ROUNDING / self.pair_steps
+        return (truth < self.disparities.least - rounding) | (truth > self.disparities.largest + rounding)
 
     def choose(self, indices: Sequence[int], name: str | None = None) -> "Scene":
         """The same scene seen by fewer views.

@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 from attrs import Factory, evolve, field, fields_dict, frozen, has
 from cattrs import Converter
 
-from matbench.errors import UserError, unknown
+from matbench.errors import UserError, failure, one_line, unknown
 
 Value = bool | int | float | str | None
 T = TypeVar("T")
@@ -216,7 +216,7 @@ def _arguments(cls: type) -> dict[str, tuple[Any, Any]]:
         hints = get_type_hints(vars(cls)["__init__"]) if "__init__" in vars(cls) else {}
         signature = inspect.signature(cls)
     except (NameError, TypeError, ValueError, AttributeError) as error:
-        raise UserError(f"{cls!r} is no method: its parameters cannot be read: {first_line(error)}") from error
+        raise UserError(f"{cls!r} is no method: its parameters cannot be read: {one_line(error)}") from error
     kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     taken = [p for p in signature.parameters.values() if p.kind in kinds]
     return {p.name: (hints.get(p.name, _kind_of(p.default)), _default(cls, p)) for p in taken}
@@ -336,8 +336,10 @@ def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
         raise UserError(f"{name}: {', '.join(missing)} must be given, as {name}[{missing[0]}=VALUE]")
     try:
         return cls(**_grouped(cls, values))
+    except (ValueError, UserError) as error:  # meant for whoever chose the values
+        raise UserError(f"{name}: {one_line(error)}") from error
     except Exception as error:
-        raise UserError(f"{name}: {first_line(error)}") from error
+        raise UserError(f"{name}: {failure(error)}") from error
 
 
 def values_of(instance: object) -> dict[str, Value]:
@@ -375,12 +377,6 @@ def changed(instance: object, preset: str | None = None) -> dict[str, Value]:
     named: dict[str, Value] = {} if preset is None else {"preset": preset}
     base |= presets_of(cls)[preset] if preset is not None else {}
     return named | {key: value for key, value in values_of(instance).items() if value != base[key]}
-
-
-def first_line(error: BaseException) -> str:
-    """What an exception says, in one line; its type where it says nothing."""
-    said = str(error.args[0] if error.args else error).strip()
-    return said.splitlines()[0] if said else type(error).__name__
 
 
 def expand(selectors: str | Iterable[str]) -> list[Spec]:

@@ -14,11 +14,10 @@ from typing import Literal, get_args
 import pandas as pd
 from attrs import frozen
 
-from matbench.errors import UserError, unknown
+from matbench.errors import UserError, one_line, unknown
 from matbench.measures.statistics import FEW
 from matbench.reports import standing, tables
 from matbench.reports.tables import METRIC, REGION, REGIONS, Shared
-from matbench.spec import first_line
 
 Format = Literal["tex", "md", "csv"]
 FORMATS: tuple[Format, ...] = get_args(Format)
@@ -104,7 +103,7 @@ def _read(path: Path, texts: Mapping[str, type], numbers: Sequence[str]) -> pd.D
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}; give the folder of a finished run") from error
     except (ValueError, KeyError) as error:
-        raise UserError(f"{path} is damaged: {first_line(error)}") from error
+        raise UserError(f"{path} is damaged: {one_line(error)}") from error
     missing = [name for name in texts if name not in frame]
     if missing:
         raise UserError(f"{path} is damaged: it has no column {missing[0]!r}")
@@ -137,8 +136,10 @@ def sheet(
     Raises
     ------
     UserError
-        If nothing was scored by that metric, or in one of the regions.
+        If nothing was scored at all, by that metric, or in one of the regions.
     """
+    if results.empty:
+        raise UserError(tables.none_scored(cells))
     results, cells = tables.labelled(results), tables.labelled(cells)
     units = tables.metrics(results)
     if metric not in units:

@@ -221,6 +221,17 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, hi
     return out.loc[order.index]
 
 
+def none_scored(cells: pd.DataFrame) -> str:
+    """Why a run has no score at all, in a line: what became of its cells, and why the first has none."""
+    statuses = ", ".join(f"{count} {status}" for status, count in cells["status"].value_counts().items())
+    if not statuses:
+        return "no cell of this run has a score: there are no cells"
+    first = labelled(cells).iloc[0]
+    reason = first.get("reason")
+    why = f": {reason}" if isinstance(reason, str) and reason else ""
+    return f"no cell of this run has a score ({statuses}): {first['method']} on {first['scene']}{why}"
+
+
 def text(value: float, unit: str) -> str:
     """A number as every table shows it, without its unit.
 

@@ -28,6 +28,7 @@ from matbench.reports.tables import text as shown
 WIDTH = 80
 NARROW = ("disc", "textureless")
 _PADDING = 2
+_LOG = r" \(log: [^ ]+\)$"
 _NAMED = 3  # scenes that are named where a method fails on many for the same reason
 
 
@@ -40,7 +41,7 @@ def tables(
     """
     scope = shared(results, cells)
     out = []
-    if scope.methods:
+    if scope.methods and len(results):
         heads = {f"{metric} {r}": r.replace("textureless", "texture-\nless") for r in REGIONS}
         heads |= {"avg all": "avg\nall", "seconds": "time"}
         if width < WIDTH:
@@ -152,12 +153,12 @@ def _bad(bad: pd.DataFrame) -> Table:
     table = _plain(f"{len(bad)} cell{'s' if len(bad) != 1 else ''} without a score")
     for head in ("method", "scene", "seed", "status", "reason"):
         table.add_column(head, overflow="fold", justify="right" if head == "seed" else "left")
-    for (method, status, reason), rows in bad.fillna({"reason": ""}).groupby(
-        ["method", "status", "reason"], sort=False
-    ):
+    bad = bad.fillna({"reason": ""})
+    alike = bad["reason"].astype(str).str.replace(_LOG, "", regex=True)  # each cell has a log of its own
+    for (method, status, _), rows in bad.groupby(["method", "status", alike], sort=False):
         scenes = list(dict.fromkeys(map(str, rows["scene"])))
         more = [f"and {len(scenes) - _NAMED} more"] if len(scenes) > _NAMED else []
         seeds = ", ".join(map(str, dict.fromkeys(rows["seed"])))
         where = Text("\n".join([*scenes[:_NAMED], *more]))
-        table.add_row(Text(str(method)), where, seeds, str(status), Text(str(reason)))
+        table.add_row(Text(str(method)), where, seeds, str(status), Text(str(rows["reason"].iloc[0])))
     return table

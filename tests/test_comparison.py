@@ -56,6 +56,18 @@ def test_results_are_tidy_and_exact(tmp_path: Path) -> None:
     assert set(results.params) == {"value=2.0"}
 
 
+def test_truth_beyond_a_range_is_told_once_for_each_scene(tmp_path: Path) -> None:
+    narrow = "synthetic/box[disparities=0:3 size=96x72]"
+    scene = matbench.load_scene(narrow)
+    beyond = int((scene.truth[scene.ref].astype(float) * scene.pair_steps > 3).sum())
+    assert 0 < beyond < scene.height * scene.width
+    ready = comparison.prepare("flat", [SMALL, narrow], plugin=[METHODS], out=tmp_path / "run")
+    (remark,) = ready.remarks
+    assert remark.startswith(f"{scene.name}: {beyond} of {scene.height * scene.width} pixels")
+    ready.run()
+    assert remark in ready.report(*ready.tables()).read_text("utf-8")
+
+
 def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
     bad = ["exits", "leaves", "raises", "writes", "misshapen", "bare", "peeks", "declines"]
     results = compare(tmp_path, *bad, "flat")
@@ -72,7 +84,10 @@ def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
         "flat": "ok",
     }
     assert "exit status 7" in found.reason["exits"]
-    assert found.reason["raises"] == "ArithmeticError: the third digit is missing"
+    line = 1 + next(k for k, said in enumerate(METHODS.read_text().splitlines()) if "third digit" in said)
+    log = f"cells/{found.cell['raises']}/log.txt"
+    said = "ArithmeticError: the third digit is missing and more"
+    assert found.reason["raises"] == f"{said} (methods.py:{line}) (log: {log})"
     assert "read-only" in found.reason["writes"]
     assert "(72, 96)" in found.reason["misshapen"]
     assert "ndarray, not an Estimate" in found.reason["bare"]
@@ -81,6 +96,24 @@ def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
     log = (tmp_path / "run" / "cells" / found.cell["raises"] / "log.txt").read_text()
     assert "about to fail" in log
     assert "ArithmeticError" in log
+
+
+def test_what_fails_says_what_where_and_where_its_log_is(tmp_path: Path) -> None:
+    plugin = tmp_path / "opens.py"
+    plugin.write_text(
+        "class Opens:\n    def solve(self, scene, context):\n        return open('/nowhere/weights.bin')\n\n"
+        "class Calls:\n    def solve(self, scene, context):\n        import subprocess\n"
+        "        return subprocess.run(['false'], check=True)\n"
+    )
+    matbench.compare(["opens", "calls"], SMALL, out=tmp_path / "run", plugin=plugin)
+    found = cells(tmp_path)
+    for name, reason in {
+        "opens": "FileNotFoundError: [Errno 2] No such file or directory: '/nowhere/weights.bin' (opens.py:3)",
+        "calls": "CalledProcessError: Command '['false']' returned non-zero exit status 1. (opens.py:8)",
+    }.items():
+        log = f"cells/{found.cell[name]}/log.txt"
+        assert (found.status[name], found.reason[name]) == ("failed", f"{reason} (log: {log})")
+        assert "Traceback" in (tmp_path / "run" / log).read_text()
 
 
 def test_an_empty_map_is_totally_bad(tmp_path: Path) -> None:

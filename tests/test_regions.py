@@ -8,7 +8,7 @@ import pytest
 from matbench.datasets.middlebury import MIDDLEBURY_2001, MIDDLEBURY_2003
 from matbench.datasets.synthetic import SYNTHETIC, WORLDS
 from matbench.files.images import read_grey
-from matbench.regions import VIEW_REGIONS, near_jumps, points_seen, regions, textureless, view_regions
+from matbench.regions import VIEW_REGIONS, counts, near_jumps, points_seen, regions, textureless, view_regions
 from matbench.scene import Scene
 
 NAN = np.nan
@@ -238,3 +238,22 @@ def test_real_scenes_have_regions_over_views(data_root: Path) -> None:
     # what the pair sees is seen in two views at least, and what all see the pair sees
     assert not (masks["seen_once"] & masks["nonocc"]).any()
     assert not (masks["seen_in_all"] & masks["occ"]).any()
+
+
+@pytest.mark.parametrize(
+    ("pixels", "known", "does"),
+    [
+        (0, 43200, False),
+        (1, 43200, False),
+        (215, 43200, False),  # 0.5 % are 216
+        (216, 43200, True),
+        (34230, 43200, True),
+        (60, 6912, False),  # more than 0.5 %, but too few
+        (99, 6912, False),
+        (100, 6912, True),
+        (50, 50, True),  # the whole scene
+        (0, 0, False),
+    ],
+)
+def test_small_regions_do_not_count(pixels: int, known: int, does: bool) -> None:
+    assert counts(pixels, known) is does

@@ -33,6 +33,23 @@ def test_choosing_views_rescales_disparities_truth_and_pair() -> None:
     assert chosen.regions["all"] is scene.regions["all"]
 
 
+@pytest.mark.parametrize(
+    ("bounds", "row"),
+    [
+        ((-1, 3), [0, 0, 0, 0, 0]),
+        ((0, 2.99999), [0, 0, 0, 0, 0]),  # rounding
+        ((0, 2.9), [0, 0, 0, 1, 0]),
+        ((1.6, 3), [1, 0, 0, 0, 1]),
+        ((5, 6), [1, 0, 1, 1, 1]),
+    ],
+)
+def test_truth_outside_the_range_is_marked(bounds: tuple[float, float], row: list[int]) -> None:
+    scene = evolve(make(), disparities=Range(*bounds))
+    np.testing.assert_array_equal(scene.out_of_range, np.array([row] * 4, bool))
+    np.testing.assert_array_equal(scene.choose([0, 2, 4]).out_of_range, scene.out_of_range)
+    assert not evolve(scene, truth={}).out_of_range.any()
+
+
 @pytest.mark.parametrize("indices", [[2], [], [0, 1, 3], [4, 2, 0], [2, 2], [0, 1], [2, 11], [-1, 2]])
 def test_impossible_choices_are_refused(indices: list[int]) -> None:
     with pytest.raises(SceneError) as error:

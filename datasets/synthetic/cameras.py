@@ -49,6 +49,9 @@ class Strengths:
 
 LARGEST = Strengths(gain=0.9, bias=100, vignetting=0.9, blur=20, noise=50, misaligned=20, highlight=255)
 
+NOTHING = Strengths(noise=0.0)
+"""A perfect camera."""
+
 NAMES = tuple(each.name for each in fields(Strengths))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.datasets.choose import search_range, views_and_reference
-from matbench.datasets.synthetic.cameras import LARGEST, NAMES, Strengths, exposed, heights
+from matbench.datasets.synthetic.cameras import LARGEST, NAMES, NOTHING, Strengths, exposed, heights
 from matbench.datasets.synthetic.rendering import Rig
 from matbench.datasets.synthetic.textures import pattern
 from matbench.datasets.synthetic.worlds import WORLDS, World
@@ -84,7 +84,8 @@ class _Request:
     def scale(self) -> float:
         return self.width / _WIDTH
 
-    def rig(self) -> Rig:
+    def rig(self, highlight: float | None = None) -> Rig:
+        """The cameras; `highlight` instead of the strength that was asked for."""
         return Rig(
             self.world.build(),
             self.n,
@@ -94,7 +95,7 @@ class _Request:
             _BASELINE,
             self.world.offset * self.scale,
             heights(self.strengths, self.seed, self.n),
-            self.strengths.highlight,
+            self.strengths.highlight if highlight is None else highlight,
         )
 
     def disparities(self) -> Range:
@@ -114,7 +115,8 @@ class Synthetic:
 
         Options: `n` views, `size` of a picture, `seed` of textures, cameras and noise, `views` and
         `baseline` to keep, `ref` to score, by number, `disparities` to search; and what the cameras
-        do (`cameras.Strengths`).
+        do (`cameras.Strengths`). Regions come from pictures without any of the latter, so that they stay
+        the same whatever is swept; only a misaligned camera's are where its picture is.
         """
         ask = _Request.read(name, options)
         labels = [str(view) for view in range(ask.n)]
@@ -126,8 +128,11 @@ class Synthetic:
         searched = search_range(ask.called, options.get("disparities"), pair_steps)
         rig, marks = ask.rig(), pattern(ask.seed)
 
+        reference = rig.picture(ref, marks)
+
         def look(view: int) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.bool_]]:
-            picture = exposed(rig.picture(view, marks), ask.strengths, ask.seed, view, ask.n)
+            sharp = reference if view == ref else rig.picture(view, marks)
+            picture = exposed(sharp, ask.strengths, ask.seed, view, ask.n)
             depth = rig.depth(view)
             return picture, rig.disparity(depth).astype(np.float32), rig.visible(view, depth)
 
@@ -136,6 +141,8 @@ class Synthetic:
         for view, (picture, _, _) in found.items():
             views[view] = picture
         _, truth, visible = found[ref]
+        dull = ask.rig(highlight=0).picture(ref, marks) if ask.strengths.highlight else reference
+        undisturbed = exposed(dull, NOTHING, ask.seed, ref, ask.n)
         full = Scene(
             name=spec.label(ask.called, dict(sorted(options.items()))),
             views=views,
@@ -144,7 +151,7 @@ class Synthetic:
             disparities=searched or ask.disparities(),
             truth={view: truth for view, (_, truth, _) in found.items()},
             pair_steps=pair_steps,
-            regions=regions(views[ref], truth, partner, visible[ref + partner]),
+            regions=regions(undisturbed, truth, partner, visible[ref + partner]),
             visible={view: seen for view, (_, _, seen) in found.items()},
         )
         return full if len(chosen) == ask.n else full.choose(chosen)

@@ -1,5 +1,6 @@
 """`matbench export`: a run as one file."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -45,5 +46,5 @@ def export(
     if left:
         console.say(f"{left} cells of the plan are not done, and so not in the archive")
     console.say(f"archive: {place}")
-    console.say(f"to check it: matbench score {place}")
+    console.say(f"to check it: matbench score {shlex.quote(str(place))}")
     return DONE

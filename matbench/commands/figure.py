@@ -155,9 +155,8 @@ def maps(
     scenes: dict[str, Scene] = {}
     found: dict[tuple[str, str], NDArray[np.float32]] = {}
     with console.status("reading") as status:
-        for cell in cells:
-            if cell.scene not in names or str(cell.method) not in methods:
-                continue
+        chosen = [cell for cell in cells if cell.scene in names and str(cell.method) in methods]
+        for cell in chosen:
             if cell.scene not in scenes:
                 status.update(f"{cell.scene}: reading")
                 scenes[cell.scene] = _scene(cell, data, console)
@@ -165,6 +164,8 @@ def maps(
             stored = _stored(store, cell, known)
             if stored is not None and stored.shape == (known.height, known.width):
                 found.setdefault((str(cell.method), cell.scene), stored)
+    if not found:
+        raise UserError(f"no disparity map to draw: {_lacking(store, chosen)}")
     with console.status("drawing"):
         drawn = map_figure.draw(map_figure.Maps(tuple(scenes[n] for n in names), tuple(methods), found), width, errors)
         _write(drawn, stem, console)
@@ -212,6 +213,13 @@ def _stored(store: "Store", cell: "Cell", scene: "Scene") -> "NDArray[np.float32
     if outcome is None or outcome.status != "ok":
         return None
     return store.disparity(cell).get(scene.ref)
+
+
+def _lacking(store: "Store", cells: "Sequence[Cell]") -> str:
+    """What became of cells of which none has a map: how many there are, and the first one's reason."""
+    outcome = store.outcome(cells[0])
+    became = "not computed yet" if outcome is None else f"{outcome.status} {outcome.reason}".strip()
+    return f"none of {len(cells)} cells is ok; {cells[0]}: {became}"
 
 
 def _stem(out: Path | None, run: Path, name: str) -> Path:

@@ -66,6 +66,8 @@ def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
     voice = Voice.of(options)
     for reason, scenes in ready.left_out.items():
         voice.say(f"without {', '.join(scenes)}: {reason}")
+    for remark in ready.remarks:
+        voice.say(remark)
     if ready.settings.dask is None and (crowd := crowded(ready.settings.jobs, ready.settings.threads_each())):
         voice.say(crowd)
     with locked(ready.folder), _ended_as_by_ctrl_c():
@@ -104,6 +106,8 @@ def show_plan(ready: Comparison, options: Options) -> int:
     console = Console()
     for reason, scenes in ready.left_out.items():
         console.say(f"without {', '.join(scenes)}: {reason}")
+    for remark in ready.remarks:
+        console.say(remark)
     console.say(f"{total - len(todo)} of {total} cells stay as they are in {ready.folder}, {len(todo)} would run")
     for cell, why in todo:
         console.say(f"  {cell}: {why}")
@@ -135,6 +139,8 @@ def publish(
         print(ready.folder)
     else:
         _print_tables(results, cells, switches, sweeps, metric, voice.talk)
+        if results.empty:
+            voice.say(tables.none_scored(cells))
         for line in unsteady(ready.plan, ready.store):
             voice.say(f"does not repeat itself: {line}")
         if say_paths:
@@ -146,11 +152,10 @@ def _say_paths(ready: Comparison, written: dict[str, Path], voice: Voice) -> Non
     for what, path in written.items():
         voice.say(f"{what}: {path}")
     if any(ready.folder.glob("cells/*/recording.rrd")):
-        voice.say(f"recordings: matbench view {ready.folder}")
+        voice.say(f"recordings: matbench view {shlex.quote(str(ready.folder))}")
     if stale := len(ready.store.stale(ready.plan)):
-        voice.say(
-            f"{stale} stored cells are of other code or pixels: matbench status {ready.folder} --prune removes them"
-        )
+        prune = shlex.join(["matbench", "status", str(ready.folder), "--prune"])
+        voice.say(f"{stale} stored cells are of other code or pixels: {prune} removes them")
 
 
 def document(

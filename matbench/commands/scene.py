@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -81,7 +82,7 @@ def show(
 
             with console.status(f"{name}: recording"):
                 record_scene(path.with_suffix(".rrd"), scene)
-            console.say(f"recording: matbench view {path.with_suffix('.rrd')}")
+            console.say(f"recording: matbench view {shlex.quote(str(path.with_suffix('.rrd')))}")
     return DONE
 
 
@@ -103,7 +104,8 @@ def check(name: str, *, data: Data = None) -> int:
 
     Order, shift and rows are measured on matched features; truth by warping: the other views,
     sampled where it says, must look like the view it belongs to, and more so than with the truth
-    one pixel off. Ends with status 1 if there is a problem.
+    one pixel off. Ends with status 1 if there is a problem, or if nothing shows that all pictures are
+    views of one scene.
 
     **Examples**
 
@@ -120,15 +122,15 @@ def check(name: str, *, data: Data = None) -> int:
 
     from matbench.datasets.folder import describe
     from matbench.scenes.catalogue import load_scene, own_folder
-    from matbench.scenes.scene_check import Finding, check
+    from matbench.scenes.scene_check import Finding, check, conclusion
     from matbench.spec import parse
 
-    console, problems, files = Console(), 0, None
+    console, files = Console(), None
+    told: list[Finding] = []
     marks = {"good": ("✓", "green"), "note": ("•", "yellow"), "problem": ("✗", "bold red"), "unknown": ("?", "yellow")}
 
     def tell(finding: Finding) -> None:
-        nonlocal problems
-        problems += finding.verdict == "problem"
+        told.append(finding)
         mark, style = marks[finding.verdict]
         line = Text.assemble((f"{mark} ", style), (f"{finding.topic}: ", "bold"), finding.text)
         console.print(line, soft_wrap=True, highlight=False)
@@ -140,7 +142,7 @@ def check(name: str, *, data: Data = None) -> int:
             stored = describe(folder)
             for problem in stored.problems():
                 tell(Finding("files", "problem", problem))
-            if problems:
+            if told:
                 return FAILED
             files = dict(zip(stored.labels, (path.name for path in stored.views), strict=True))
         scene = load_scene(name, data)
@@ -149,8 +151,9 @@ def check(name: str, *, data: Data = None) -> int:
         status.update("matching features, warping views")
         for finding in check(scene, [files[label] for label in scene.labels] if files else None):
             tell(finding)
-    console.say(f"{problems} problem{'s' if problems != 1 else ''}" if problems else "no problems")
-    return FAILED if problems else DONE
+    said, is_shown = conclusion(told)
+    console.say(said)
+    return DONE if is_shown else FAILED
 
 
 @app.command(help_epilogue="")
@@ -188,5 +191,5 @@ def new(
     for remark in draft.remarks:
         console.say(f"• {remark}")
     console.say(f"written: {draft.path}")
-    console.say(f"next: matbench scene check {folder}")
+    console.say(f"next: matbench scene check {shlex.quote(str(folder))}")
     return DONE

@@ -1,6 +1,7 @@
 """`matbench status`: where a run stands."""
 
 import json
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -76,7 +77,7 @@ def _lines(found: Standing) -> list[str]:
         size = found.stale_bytes / 2**20
         lines.append(f"{found.stale} stored cells ({size:.1f} MiB) are of other code or pixels; --prune removes them")
     if found.tables and not found.work:
-        lines.append(f"tables are stale, {found.tables}: type matbench score {found.folder}")
+        lines.append(f"tables are stale, {found.tables}: type matbench score {shlex.quote(str(found.folder))}")
     return lines
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from matbench.errors import failure
+
 Errors = NDArray[np.float64]
 
 TIE = 1e-4
@@ -178,5 +180,5 @@ def value_of(metric: Any, argument: Any, pixels: int) -> float:
     try:
         return float(metric.compute(argument))
     except Exception as error:
-        warnings.warn(f"metric {metric.name} failed: {type(error).__name__}: {error}", stacklevel=3)
+        warnings.warn(f"metric {metric.name} failed: {failure(error)}", stacklevel=3)
         return float("nan")

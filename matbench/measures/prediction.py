@@ -44,6 +44,18 @@ class PredictionMetric:
     compute: Callable[[Differences], float]
 
 
+def predictable(scene: Scene) -> tuple[str, ...]:
+    """The ends of a scene that `hold_out` can take: not the reference view, and two views must be left."""
+    ends = {"left": 0, "right": scene.n - 1}
+    return tuple(end for end, index in ends.items() if index != scene.ref) if scene.n > 2 else ()
+
+
+def instead_of_truth(scene: Scene) -> str:
+    """What a scene without ground truth needs to be scored, in words."""
+    options = [f"[predict={end}]" for end in predictable(scene)]
+    return f"{' or '.join(options)} after the scene" if options else "ground truth, or a third view to be predicted"
+
+
 def hold_out(scene: Scene, end: str) -> Scene:
     """The scene without its leftmost or rightmost view, which becomes `Scene.held_out`.
 
@@ -56,11 +68,12 @@ def hold_out(scene: Scene, end: str) -> Scene:
     if end not in ENDS:
         raise unknown(f"view to predict of {scene.name}", end, ENDS)
     index = 0 if end == "left" else scene.n - 1
-    if index == scene.ref:
-        label = scene.labels[index]
-        raise NotInScene(f"{scene.name}: the {end} view, {label}, is the reference view: choose another by ref=")
-    if scene.n < 3:
+    possible = predictable(scene)
+    if not possible:
         raise NotInScene(f"{scene.name}: {scene.n} views; at least three are needed to predict one of them")
+    if end not in possible:
+        called = f"the {end} view, {scene.labels[index]}, is the reference view"
+        raise NotInScene(f"{scene.name}: {called}: predict={possible[0]} is possible")
     rest = [view for view in range(scene.n) if view != index]
     held_out = HeldOut(scene.labels[index], index - scene.ref, scene.views[index])
     return evolve(scene.choose(rest), held_out=held_out)

@@ -15,8 +15,7 @@ from typing import Any, Literal
 
 from attrs import frozen
 
-from matbench.errors import UserError, unknown
-from matbench.spec import first_line
+from matbench.errors import UserError, failure, unknown
 
 Group = Literal["algorithms", "datasets", "metrics"]
 
@@ -54,8 +53,7 @@ class Plugin:
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # whatever a module does when imported, sys.exit included
-            why = f"{type(error).__name__}: {first_line(error)}"
-            raise UserError(f"plug-in {self.name!r} from {self.source} cannot be imported: {why}") from error
+            raise UserError(f"plug-in {self.name!r} from {self.source} cannot be imported: {failure(error)}") from error
 
 
 @cache
@@ -121,7 +119,7 @@ def _import_file(path: Path) -> ModuleType:
         raise
     except BaseException as error:  # sys.exit included
         del sys.modules[name]
-        raise UserError(f"plug-in file {str(path)!r}: {type(error).__name__}: {first_line(error)}") from error
+        raise UserError(f"plug-in file {str(path)!r}: {failure(error)}") from error
     return module
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import stat
 import tempfile
 from collections.abc import Iterator
@@ -74,7 +75,9 @@ def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
         raise UserError(f"{str(place)!r} is there already and is no exported run: name another file by --out")
     with locked(folder):
         if why := freshness.fault(plan, store):
-            raise UserError(f"the tables of {str(folder)!r} are stale, {why}: type matbench score {folder} first")
+            raise UserError(
+                f"the tables of {str(folder)!r} are stale, {why}: type matbench score {shlex.quote(str(folder))} first"
+            )
         done = [cell for cell in plan.cells if store.outcome(cell) is not None]
         paths = [path for name in TOP if _is_plain(path := folder / name)]
         paths += [path for cell in done for path in files_of(store, cell)]

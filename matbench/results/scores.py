@@ -161,6 +161,13 @@ def reliabilities(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.D
     return pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(columns=columns)
 
 
+def _log_of(store: Store, cell: Cell) -> str:
+    """Where a cell's log lies in the run folder, to stand after its reason; nothing if it has none."""
+    log = store.cell(cell) / "log.txt"
+    printed = log.is_file() and log.stat().st_size > 0
+    return f" (log: {log.relative_to(store.folder).as_posix()})" if printed else ""
+
+
 def cells(plan: Plan, store: Store) -> pd.DataFrame:
     """One row for each cell of the plan: what became of it and what it cost (`CELL_COLUMNS`)."""
     rows: list[tuple[object, ...]] = []
@@ -172,9 +179,12 @@ def cells(plan: Plan, store: Store) -> pd.DataFrame:
             rows.append((*head, "interrupted", *[None] * 5, "", "not computed yet", cell.key, "", "", ""))
             continue
         found = repeated.get(cell.key)
-        status, reason = outcome.status, outcome.reason
+        status, reason, told_by = outcome.status, outcome.reason, cell
         if found is not None and found.failed is not None and status == "ok":
-            status, reason = found.failed[1].status, f"repeat {found.failed[0].repeat}: {found.failed[1].reason}"
+            told_by, failed = found.failed
+            status, reason = failed.status, f"repeat {told_by.repeat}: {failed.reason}"
+        if reason and status != "skipped":
+            reason += _log_of(store, told_by)
         told = (cell.key, outcome.ran_on.get("machine", ""), outcome.maps, str(found or ""))
         cost = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb, outcome.threads, outcome.alone)
         work = " ".join(f"{name}={count}" for name, count in outcome.work.items())

@@ -349,7 +349,7 @@ class Store:
         paths = {str(c): self.cell(c) / "recording.rrd" for c in self.plan().cells}
         recorded = {name: path for name, path in paths.items() if path.exists()}
         if not recorded:
-            raise UserError(f"run {str(self.folder)!r} has no recordings: type its compare command again with --record")
+            raise UserError(f"run {str(self.folder)!r} has no recordings: only compare with --record writes them")
         hits = [name for name, path in recorded.items() if part is None or part in name or part in path.parent.name]
         exact = [name for name in hits if name == part]
         if len(exact or hits) != 1:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from attrs import evolve, frozen
 
-from matbench.errors import UserError, unknown
+from matbench.errors import UserError, failure, unknown
 from matbench.plans import plugins
 from matbench.scene import Scene
 from matbench.scenes import views_only
@@ -94,7 +94,7 @@ def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
         except UserError as error:
             found[prefix] = error
         except Exception as error:  # a plug-in's own failure harms no other
-            found[prefix] = UserError(f"dataset {prefix!r} from {plugin.source}: {type(error).__name__}: {error}")
+            found[prefix] = UserError(f"dataset {prefix!r} from {plugin.source}: {failure(error)}")
     return found
 
 

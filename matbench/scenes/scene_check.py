@@ -1,12 +1,14 @@
 """Is a scene what it says it is? Its images and its ground truth, asked; the answers in words."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from hashlib import sha256
 from typing import Literal
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from matbench.measures.prediction import instead_of_truth
 from matbench.measures.warping import picture_columns
 from matbench.scene import Scene
 from matbench.scenes import alignment
@@ -18,11 +20,12 @@ Verdict = Literal["good", "note", "problem", "unknown"]
 NOTED_ROWS, WRONG_ROWS = 0.5, 1.0  # px of vertical misalignment
 NOTED_STEP, WRONG_STEP = 0.12, 0.3  # of a view step, from the view's place
 IN_RANGE = 0.9  # share of matched features that the range must hold
-KNOWN_IN_RANGE = 0.98  # share of the truth
+LARGEST_BEYOND = 0.02  # share of the truth that may lie outside the range; all of it is told
 LEAST_SEEN = 0.1  # share of the truth's points that the other views see, together
 NOTED_SHIFT = 0.5  # px of the pair, from where the truth explains the views best
 CLEARLY = 0.9  # of the warping error: a rival that leaves less explains the views better
 _CLEAR_SHARE = 0.3  # by which one direction must hold more features than the other
+_TRUTH_OF = "truth of "
 _TRIAL_PIXELS = 200_000  # rivals of the truth are tried on every k-th row
 
 
@@ -64,13 +67,30 @@ def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Finding]
     yield _order(scene, called, places)
     yield _direction(scene, found)
     yield _rows(matches, called)
+    yield from _same(scene, called)
     yield from _borders(scene, called)
     if not scene.truth:
-        yield Finding(
-            "truth", "note", "there is none: a comparison needs [predict=left] or [predict=right] after the scene"
-        )
+        yield Finding("truth", "note", f"there is none: a comparison needs {instead_of_truth(scene)}")
     for view in sorted(scene.truth):
         yield from _truth(evolve(scene, ref=view, regions={}), called[view])
+
+
+def conclusion(findings: Iterable[Finding]) -> tuple[str, bool]:
+    """What all findings say together, in a line, and whether they show that a scene is what it says.
+
+    What could not be measured is not good. Only truth that explains the images makes up for it: it shows
+    that they are views of one scene, in this order and at these steps.
+    """
+    told = list(findings)
+    problems = sum(finding.verdict == "problem" for finding in told)
+    if problems:
+        return f"{problems} problem{'s' if problems != 1 else ''}", False
+    unknown = ", ".join(finding.topic for finding in told if finding.verdict == "unknown")
+    if not unknown:
+        return "no problems", True
+    if any(finding.topic.startswith(_TRUTH_OF) and finding.verdict in ("good", "note") for finding in told):
+        return f"no problems, but unknown: {unknown}", True
+    return f"not confirmed: {unknown} could not be measured; are all of these pictures views of one scene?", False
 
 
 def _list(names: Sequence[str]) -> str:
@@ -91,6 +111,8 @@ def _inside(scene: Scene, disparities: NDArray[np.float64]) -> float:
 
 
 def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | None) -> Finding:
+    if scene.n == 2 and places is None:
+        return Finding("order", "unknown", "two views, and too few features are found again in the other one")
     if scene.n == 2:
         return Finding("order", "good", "two views: their order is what the direction of the shift shows")
     if places is None or np.isfinite(places).sum() < 3:
@@ -108,9 +130,11 @@ def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | Non
         return Finding("order", "problem", f"views are not evenly spaced: {text}, not {worst - scene.ref}")
     if away[worst] > NOTED_STEP:
         return Finding("order", "note", f"views are not quite evenly spaced: {text}, not {worst - scene.ref}")
-    left = _list([names[view] for view in range(scene.n) if view not in known])
-    unsure = f"; too few features in {left}" if left else ""
-    return Finding("order", "good", f"from one side to the other, within {away[worst]:.2f} of a step{unsure}")
+    even = f"from one side to the other, within {away[worst]:.2f} of a step"
+    if len(known) < scene.n:
+        left = _list([names[view] for view in range(scene.n) if view not in known])
+        return Finding("order", "unknown", f"too few features are found again in {left}; the others lie {even}")
+    return Finding("order", "good", even)
 
 
 def _direction(scene: Scene, found: NDArray[np.float64]) -> Finding:
@@ -149,6 +173,15 @@ def _rows(matches: Mapping[int, Matches], names: Sequence[str]) -> Finding:
     return Finding("rows", "problem" if wrong else "note", text + ("; rectify the views first" if wrong else ""))
 
 
+def _same(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
+    alike: dict[bytes, list[str]] = {}
+    for name, view in zip(names, scene.views, strict=True):
+        alike.setdefault(sha256(view.tobytes()).digest(), []).append(name)
+    for same in alike.values():
+        if len(same) > 1:
+            yield Finding("views", "problem", f"{_list(same)} are one and the same picture")
+
+
 def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
     lost = {}
     for name, view in zip(names, scene.views, strict=True):
@@ -160,19 +193,13 @@ def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
 
 
 def _truth(scene: Scene, name: str) -> Iterator[Finding]:
-    topic = f"truth of {name}"
-    truth = scene.truth[scene.ref]
-    known = truth[np.isfinite(truth)]
-    margin = 0.5 / scene.pair_steps
-    held = np.mean((known >= scene.disparities.least - margin) & (known <= scene.disparities.largest + margin))
-    if held < KNOWN_IN_RANGE:
-        ends = f"{known.min():g} .. {known.max():g}"
-        text = (
-            f"{100 * (1 - held):.0f} % of it lies outside the range {scene.disparities}: it is {ends} px per view step"
-        )
-        yield Finding(topic, "problem", text)
+    topic = f"{_TRUTH_OF}{name}"
+    known = np.count_nonzero(np.isfinite(scene.truth[scene.ref]))
+    if beyond := beyond_range(scene):
+        share = np.count_nonzero(scene.out_of_range) / known
+        yield Finding(topic, "problem" if share > LARGEST_BEYOND else "note", beyond)
     error = together(warping_errors(scene))
-    if error is None or error.pixels < LEAST_SEEN * (scene.n - 1) * known.size:
+    if error is None or error.pixels < LEAST_SEEN * (scene.n - 1) * known:
         yield Finding(topic, "problem", "it leads out of the other views nearly everywhere: is its scale right?")
         return
     at = error.mean
@@ -187,6 +214,22 @@ def _truth(scene: Scene, name: str) -> Iterator[Finding]:
         best = _vertex(error)
         text = f"; {best:+.1f} px would explain them best" if abs(best) > NOTED_SHIFT else ""
         yield Finding(topic, "note" if text else "good", said + text)
+
+
+def beyond_range(scene: Scene) -> str | None:
+    """How much of the reference view's truth lies outside the range that is searched, in words; None if nothing does.
+
+    Whatever little it is, it is told: a method that keeps to the range is wrong there, however good it is.
+    """
+    beyond = int(np.count_nonzero(scene.out_of_range))
+    if not beyond:
+        return None
+    truth = scene.truth[scene.ref]
+    known = truth[np.isfinite(truth)]
+    return (
+        f"{beyond} of {known.size} pixels of known truth ({100 * beyond / known.size:.2f} %) lie outside the range "
+        f"{scene.disparities}, where no method searches: truth is {known.min():g}..{known.max():g} px per view step"
+    )
 
 
 def _vertex(error: WarpingError) -> float:

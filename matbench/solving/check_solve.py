@@ -22,15 +22,14 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.algorithm import Context
+from matbench.errors import failure
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import limits, plugins
 from matbench.plans.plan import Method
 from matbench.solving import memory, processes
 from matbench.solving.check_scenes import Trial
 from matbench.solving.worker import checked
-from matbench.spec import first_line
 
-HARNESS = Path(__file__).parents[1]
 _TICK = 0.05  # seconds between two looks at a process
 
 
@@ -107,14 +106,7 @@ def solve_here(method: Method, files: Sequence[Path], trial: Trial, log: Path) -
             return Answer(maps, digest, infinite, touched)
         except BaseException as error:  # whatever a method raises, SystemExit included
             traceback.print_exc()
-            return Answer(error=f"{type(error).__name__}: {first_line(error)}{_where(error)}")
-
-
-def _where(error: BaseException) -> str:
-    """The last line outside the harness in the traceback, as `` (file.py:12)``; empty if there is none."""
-    frames = [(Path(one.filename), one.lineno) for one in traceback.extract_tb(error.__traceback__)]
-    outside = [f" ({path.name}:{line})" for path, line in frames if path.parent.parent != HARNESS]
-    return outside[-1] if outside else ""
+            return Answer(error=failure(error))
 
 
 def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Path], trial: Trial, log: Path) -> None:

@@ -24,7 +24,7 @@ from uuid import uuid4
 from attrs import define, evolve, frozen
 
 from matbench import spec
-from matbench.errors import UserError
+from matbench.errors import UserError, failure
 from matbench.files.unzip import ArchiveError
 from matbench.plans import plugins
 from matbench.plans.limits import cores
@@ -35,7 +35,6 @@ from matbench.runs.store import Outcome, Store
 from matbench.scenes.catalogue import data_root, load_scene
 from matbench.solving.keeper import Keeper
 from matbench.solving.worker import Job
-from matbench.spec import first_line
 
 _PATIENCE = "10s"  # that the scheduler has to answer
 _TICK = 0.2  # seconds between two looks at whether the client still wants a task
@@ -171,9 +170,8 @@ def _keep_reply(store: Store, cell: Cell, future: Any, reply: Any, before: Seque
         return evolve(wrong, reason="; ".join(f"{why} ({worker})" for why, worker in every.items()))
     if future.status == "cancelled":
         return evolve(wrong, status="interrupted", reason="the cluster has dropped it")
-    failure = reply[1] if isinstance(reply, tuple) else reply
-    said = f"{type(failure).__name__}: {first_line(failure)}"
-    return evolve(wrong, status="crashed", reason=f"no worker finished it: {said}")
+    lost = reply[1] if isinstance(reply, tuple) else reply
+    return evolve(wrong, status="crashed", reason=f"no worker finished it: {failure(lost)}")
 
 
 @contextmanager
@@ -349,14 +347,14 @@ def _why_declined(cell: Cell, files: Sequence[str], root: Path | None) -> str:
             cell, files
         )
     except (ImportError, OSError, UserError) as error:
-        return f"the worker cannot use {name}: {first_line(error)}"
+        return f"the worker cannot use {name}: {failure(error)}"
     if not is_same:
         return f"the worker has other code of {name}, or other versions of numpy, numba or OpenCV: install the same"
     try:
         if _scene_digest(cell.scene, root) != cell.scene_digest:
             return f"the worker's {cell.scene} is another one: give all workers the same data"
     except Exception as error:
-        return f"the worker has not {cell.scene}: {first_line(error)}"
+        return f"the worker has not {cell.scene}: {failure(error)}"
     return ""
 
 

@@ -10,8 +10,8 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from typing import NoReturn
 
+from matbench.errors import failure
 from matbench.solving import processes
-from matbench.spec import first_line
 
 
 class Late(Exception):
@@ -68,7 +68,7 @@ def _do(errand: Callable[[], None], keeper: int, line: Connection) -> NoReturn:
         said = ""
     except BaseException as error:  # whatever a dataset raises, SystemExit included
         traceback.print_exc()
-        said = f"{type(error).__name__}: {first_line(error)}"
+        said = failure(error)
     finally:
         with suppress(OSError):
             line.send_bytes(said.encode("utf-8", "replace"))

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from matbench import spec
 from matbench.algorithm import Context, Estimate
-from matbench.errors import UserError
+from matbench.errors import UserError, failure
 from matbench.plans import limits, plugins
 from matbench.plans.plan import Cell
 from matbench.plans.record_option import RecordOption
@@ -20,7 +20,6 @@ from matbench.scenes import views_only
 from matbench.solving import processes
 from matbench.solving.environment import kernel_cache_in_use, without_main
 from matbench.solving.worker import checked
-from matbench.spec import first_line
 
 
 def listen(cell: Cell, files: Sequence[Path], scene: Scene, wanted: RecordOption) -> told.Told:
@@ -42,10 +41,10 @@ def listen(cell: Cell, files: Sequence[Path], scene: Scene, wanted: RecordOption
         try:
             said = line.recv_bytes().decode()
         except EOFError:
-            said = "its process has ended"
+            said = "failed: its process has ended"
         process.join()
         if said:
-            raise UserError(f"{cell}: {said}")
+            raise UserError(f"{cell} {said}")
         return told.read(heard)
 
 
@@ -65,5 +64,5 @@ def _solve(line: Connection, cell: Cell, files: Sequence[Path], views: Path, hea
             estimate = method.solve(scene, Context(cell.seed, threads, probe))
             told.write(heard, told.Told(probe, Estimate(checked(estimate, scene), estimate.volume)))
     except BaseException as error:  # whatever a method raises
-        said = f"{type(error).__name__}: {first_line(error)}"
+        said = f"failed: {failure(error)}"
     line.send_bytes(said.encode("utf-8", "replace"))

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from matbench import spec
 from matbench.algorithm import Algorithm, Context, Estimate
-from matbench.errors import UserError
+from matbench.errors import UserError, failure, one_line
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell
@@ -35,7 +35,6 @@ from matbench.runs.store import FINAL, Outcome, Status
 from matbench.scene import Scene
 from matbench.scenes import views_only
 from matbench.solving import memory, processes
-from matbench.spec import first_line
 
 _TINY = 16, 64  # rows and columns of the scene for the first, untimed solve, which compiles the kernels
 OUTCOME, MAPS, VOLUME, TOLD = "outcome.json", "disparity.npz", "volume.npz", "told.npz"
@@ -180,7 +179,7 @@ def _volume(estimate: Estimate, scene: Scene) -> StoredVolume | None:
         if volume.views[-1] >= scene.n or (volume.space.rows, volume.space.width) != (scene.height, scene.width):
             raise ValueError(f"the volume spans the views {volume.views} of {volume.space}, which is another scene")
     except (ValueError, TypeError, AttributeError) as error:
-        print(f"volume not kept: {type(error).__name__}: {error}")
+        print(f"volume not kept: {failure(error)}")
         return None
     return volume
 
@@ -232,7 +231,7 @@ def _listen(method: Algorithm, scene: Scene, job: Job, path: Path) -> str:
         told.write(path, told.Told(probe, plain))
     except Exception as error:
         traceback.print_exc()
-        return f"not recorded: {type(error).__name__}: {first_line(error)}"
+        return f"not recorded: {failure(error)}"
     return ""
 
 
@@ -278,13 +277,12 @@ def _write(answer: Answer, folder: Path) -> None:
 
 def _what_failed(error: BaseException) -> tuple[Status, str]:
     """Status and reason of a cell whose method raised."""
-    if isinstance(error, MemoryError):
-        return "out-of-memory", f"MemoryError: {error}"
-    reason = f"{type(error).__name__}: {first_line(error)}"
+    reason = failure(error)
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", reason
     # OpenCV and the system raise other types where memory does not suffice
-    is_memory = any(words in str(error).lower() for words in ("insufficient memory", "cannot allocate memory"))
+    said = one_line(error).lower()
+    is_memory = isinstance(error, MemoryError) or "insufficient memory" in said or "cannot allocate memory" in said
     return "out-of-memory" if is_memory else "failed", reason
 
 

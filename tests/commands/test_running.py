@@ -133,7 +133,8 @@ def test_a_run_speaks_to_people_and_to_scripts(
     facts = json.loads(out)
     assert facts["cells"] == {"ok": 2, "failed": 2}
     assert facts["metric"] == {"name": "total_bad_1", "unit": "%", "better": "lower"}
-    assert {one["reason"] for one in facts["unscored"]} == {"ArithmeticError: the third digit is missing"}
+    said = r"ArithmeticError: the third digit is missing and more \(methods\.py:\d+\) \(log: cells/\w+/log\.txt\)"
+    assert all(re.fullmatch(said, one["reason"]) for one in facts["unscored"])
     results, cells = (pd.read_csv(tmp_path / "run" / name) for name in ("results.csv", "cells.csv"))
     summary = tables.summary(results, cells)
     assert [row["method"] for row in facts["table"]] == summary.index.tolist() == ["flat", "raises"]
@@ -144,7 +145,10 @@ def test_a_run_speaks_to_people_and_to_scripts(
 
 def test_cells_that_fail_alike_share_a_row() -> None:
     names = ["algorithm", "params", "scene", "seed", "status", "seconds", "peak_mb", "reason"]
-    rows = [("raises", "", f"synthetic/s{k}", 0, "failed", None, None, "no digits") for k in range(9)]
+    rows = [
+        ("raises", "", f"synthetic/s{k}", 0, "failed", None, None, f"no digits (log: cells/{k:016x}/log.txt)")
+        for k in range(9)
+    ]
     cells = pd.DataFrame([*rows, ("slow", "", "synthetic/s1", 0, "timeout", None, None, "")], columns=names)
     results = pd.DataFrame(columns=["algorithm", "params", "scene", "region", "metric", "value", "unit"])
     console = Console(width=80, file=io.StringIO(), record=True)
@@ -153,4 +157,43 @@ def test_cells_that_fail_alike_share_a_row() -> None:
     assert "10 cells without a score" in text
     assert "and 6 more" in text
     assert text.count("no digits") == 1
+    assert "cells/0000000000000000/log.txt" in "".join(text.split()), "that of the first"
     assert "timeout" in text
+
+
+def test_a_run_without_a_single_score_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whatever is asked of it; not that a metric is unknown."""
+    monkeypatch.chdir(tmp_path)
+    scene = "synthetic/box[size=64x48]"
+
+    def matbench(*tokens: str) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            main(tokens)
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), " ".join(out.split()), err
+
+    said = f"no cell of this run has a score (2 failed): raises on {scene}: ArithmeticError: the third digit"
+    asked = ("-a", "raises", "bare", "-s", scene, "--plugin", str(METHODS), "--out", "run")
+    status, out, _ = matbench("compare", *asked)
+    assert status == 1
+    assert said in out
+    assert "by region" not in out, "no table of dashes"
+    assert "2 cells without a score" in out
+    status, out, _ = matbench("score", "run")
+    assert status == 0
+    assert said in out
+    for more in ([], ["--format", "md"], ["--format", "tex", "-m", "bad_2"], ["--out", "table.csv"]):
+        status, out, err = matbench("report", "run", *more)
+        assert (status, out) == (2, "")
+        assert err.startswith(f"matbench: {said}")
+        assert err.count("\n") == 1
+    assert not Path("table.csv").exists()
+    status, out, err = matbench("figure", "maps", "run", "--out", "maps")
+    assert (status, out) == (2, "")
+    assert f"none of 2 cells is ok; raises on {scene}: failed ArithmeticError" in err
+    assert not list(Path().glob("maps*"))
+    status, out, err = matbench("figure", "slice", "run", f"raises on {scene}", "--plugin", str(METHODS))
+    assert (status, err.count("\n")) == (2, 1)
+    assert f"raises on {scene} failed: ArithmeticError: the third digit is missing and more (methods.py:" in err

@@ -54,6 +54,35 @@ def test_from_a_folder_of_images_to_a_comparison(capsys: pytest.CaptureFixture[s
     assert (folder.parent / "run/report.html").exists()
 
 
+@pytest.mark.parametrize("count", [2, 3])
+def test_pictures_that_do_not_belong_together_are_not_confirmed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    """What is unknown is not good, and no advice is given that cannot be followed."""
+    monkeypatch.chdir(tmp_path)
+    Path("my desk").mkdir()
+    for number, name in enumerate(("box", "fence", "spheres")[:count]):
+        write_png(
+            Path(f"my desk/{number}.png"), load_scene(f"synthetic/{name}[n=2 seed={number} size=240x180]").views[0]
+        )
+    status, out, _ = run(capsys, "scene", "new", "my desk")
+    assert (status, out.splitlines()[-1]) == (0, "next: matbench scene check 'my desk'")
+    assert "A GUESS" in out
+    status, out, _ = run(capsys, "scene", "check", "my desk")
+    assert status == 1
+    assert "no problems" not in out
+    assert "not confirmed: order, shift, rows could not be measured" in out
+    assert ("[predict=" in out) == (count > 2)
+    status, _, err = run(capsys, "compare", "-a", "sgbm", "-s", "my desk", "--out", "run")
+    assert status == 2
+    assert ("[predict=" in err) == (count > 2)
+    if count > 2:
+        assert "needs [predict=left] or [predict=right] after the scene" in err
+        assert run(capsys, "compare", "-a", "sgbm", "-s", "my desk[predict=left]", "--dry-run", "--out", "run")[0] == 0
+    else:
+        assert "needs ground truth, or a third view" in err
+
+
 def test_check_lists_every_file_that_is_wrong(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     run(capsys, "scene", "new", "desk", "--disparities", "0", "8")
     write_png(folder / "view1.png", np.zeros((20, 30, 3), np.uint8))

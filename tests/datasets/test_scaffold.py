@@ -1,5 +1,6 @@
 """Writing a scene.toml for a folder of images."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,37 @@ def test_without_features_the_range_is_called_a_guess(tmp_path: Path) -> None:
     assert any("A GUESS" in remark for remark in draft.remarks)
     assert "A GUESS" in draft.path.read_text()
     assert load_scene(str(tmp_path)).n == 2
+
+
+def test_masks_among_views_are_left_out(folder: Path, scene: Scene) -> None:
+    names = sorted(path.name for path in folder.glob("*.png"))
+    for number, region in enumerate(("occ", "disc")):
+        write_png(folder / f"segment{number}.png", np.where(scene.regions[region], 255, 0).astype(np.uint8))
+    draft = write(folder)
+    assert tomllib.loads(draft.path.read_text())["views"] == names
+    assert sum("segment" in remark and "a mask" in remark for remark in draft.remarks) == 2
+    assert "measured" in draft.remarks[-1]
+
+
+def test_one_view_among_masks_is_too_few(tmp_path: Path, scene: Scene) -> None:
+    write_png(tmp_path / "a.png", scene.views[0])
+    write_png(tmp_path / "b.png", np.where(scene.regions["occ"], 255, 0).astype(np.uint8))
+    with pytest.raises(UserError, match=r"at least two views .* found: a\.png"):
+        write(tmp_path)
+    assert not (tmp_path / "scene.toml").exists()
+
+
+def test_random_dots_of_two_colours_are_views(tmp_path: Path) -> None:
+    dots = np.random.default_rng(0).integers(0, 2, (60, 80, 1), np.uint8).repeat(3, 2) * 255
+    for number in range(2):
+        write_png(tmp_path / f"im{number}.png", np.roll(dots, -3 * number, axis=1))
+    assert tomllib.loads(write(tmp_path).path.read_text())["views"] == ["im0.png", "im1.png"]
+
+
+def test_a_picture_of_something_else_is_named(folder: Path, scene: Scene) -> None:
+    other = load_scene(f"synthetic/fence[n=2 size={scene.width}x{scene.height}]").views[0]
+    write_png(folder / "zebra.png", other)
+    assert any("match in zebra.png: are these views of this scene?" in remark for remark in write(folder).remarks)
 
 
 def test_names_that_need_quoting(tmp_path: Path, scene: Scene) -> None:

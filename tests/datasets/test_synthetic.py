@@ -11,6 +11,7 @@ from matbench.datasets.synthetic.rendering import Rig, mirrored
 from matbench.datasets.synthetic.surfaces import EVERYWHERE, LIGHT, Column, Disc, Paint, Rectangle, Sphere
 from matbench.datasets.synthetic.textures import pattern
 from matbench.errors import UserError
+from matbench.regions import textureless
 from matbench.scene import Scene
 
 PINNED = [-0.699616, -0.784289, -0.679456, 0.839368, -0.569503, -0.892212]
@@ -189,6 +190,38 @@ def test_cameras_change_pictures_only(option: str, level: str) -> None:
     for view in range(5):
         np.testing.assert_array_equal(changed.truth[view], clean.truth[view])
         np.testing.assert_array_equal(changed.visible[view], clean.visible[view])
+
+
+@pytest.mark.parametrize("name", ["box", "weak", "highlight"])
+@pytest.mark.parametrize(
+    "disturbance",
+    [
+        {"noise": "4"},
+        {"noise": "8"},
+        {"noise": "50", "gain": "0.3", "bias": "20"},
+        {"blur": "2"},
+        {"vignetting": "0.5"},
+        {"highlight": "90"},
+    ],
+)
+def test_regions_are_those_of_the_undisturbed_scene(name: str, disturbance: dict[str, str]) -> None:
+    """What is swept does not change what is scored."""
+    nothing = {"noise": "0", "highlight": "0"}
+    clean, disturbed = (SYNTHETIC.load(name, SMALL | more, None) for more in (nothing, nothing | disturbance))
+    assert disturbed.digest != clean.digest
+    assert clean.regions["textureless"].any()
+    for region, mask in clean.scored_regions.items():
+        np.testing.assert_array_equal(disturbed.scored_regions[region], mask)
+    # without any disturbance they are those of the picture that methods are given
+    np.testing.assert_array_equal(
+        clean.regions["textureless"], clean.regions["nonocc"] & textureless(clean.views[clean.ref])
+    )
+
+
+def test_regions_of_a_misaligned_camera_are_where_its_picture_is() -> None:
+    scene = SYNTHETIC.load("weak", SMALL | {"noise": "0", "misaligned": "6"}, None)
+    expected = scene.regions["nonocc"] & textureless(scene.views[scene.ref])
+    np.testing.assert_array_equal(scene.regions["textureless"], expected)
 
 
 def _clean_and(**strengths: float) -> tuple[np.ndarray, list[np.ndarray]]:

@@ -10,7 +10,7 @@ from attrs import evolve
 from matbench import load_scene
 from matbench.scene import Range, Scene
 from matbench.scenes.alignment import match, places, rows
-from matbench.scenes.scene_check import Finding, check
+from matbench.scenes.scene_check import Finding, Verdict, check, conclusion
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +84,64 @@ def test_a_range_that_does_not_hold_the_scene_is_told(scene: Scene) -> None:
     found = [finding for finding in check(wrong) if finding.verdict == "problem"]
     assert [finding.topic for finding in found] == ["shift", f"truth of {scene.ref}"]
     assert all("outside the range 0..3" in finding.text for finding in found)
+
+
+def test_a_view_of_something_else_is_told_and_not_summed_up_as_good(scene: Scene) -> None:
+    views = scene.views.copy()
+    views[5] = load_scene("synthetic/fence[n=2 size=320x240]").views[0]
+    found = list(check(evolve(scene, views=views, truth={}, visible={}, regions={})))
+    order = next(finding for finding in found if finding.topic == "order")
+    assert order.verdict == "unknown"
+    assert "in 5;" in order.text
+    said, is_shown = conclusion(found)
+    assert not is_shown
+    assert said.startswith("not confirmed: order could not")
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_one_picture_twice_is_told(n: int) -> None:
+    scene = load_scene(f"synthetic/box[n={n}]")
+    same = evolve(scene, views=scene.views[[0, 0, *range(2, n)]], truth={}, visible={}, regions={})
+    problem = next(finding for finding in check(same) if finding.topic == "views")
+    assert problem == Finding("views", "problem", "0, 1 are one and the same picture")
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_nothing_is_known_of_blank_pictures(n: int) -> None:
+    scene = load_scene(f"synthetic/box[n={n} size=64x48]")
+    grey = np.full(scene.views.shape, 128, np.uint8) + np.arange(n, dtype=np.uint8)[:, None, None, None]
+    found = list(check(evolve(scene, views=grey, truth={}, visible={}, regions={})))
+    assert {finding.topic: finding.verdict for finding in found} == {
+        "order": "unknown",
+        "shift": "unknown",
+        "rows": "unknown",
+        "truth": "note",
+    }
+    assert not conclusion(found)[1]
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "said", "is_shown"),
+    [
+        ({"order": "good", "shift": "good", "truth": "note"}, "no problems", True),
+        ({"order": "problem", "shift": "unknown"}, "1 problem", False),
+        ({"order": "problem", "truth of 2": "problem"}, "2 problems", False),
+        ({"order": "unknown", "shift": "good", "truth": "note"}, "not confirmed: order could not be", False),
+        ({"order": "unknown", "rows": "unknown", "truth of 2": "good"}, "no problems, but unknown: order, rows", True),
+    ],
+)
+def test_unknown_is_not_summed_up_as_good(verdicts: dict[str, Verdict], said: str, is_shown: bool) -> None:
+    told, shown = conclusion([Finding(topic, verdict, "") for topic, verdict in verdicts.items()])
+    assert told.startswith(said)
+    assert shown is is_shown
+
+
+def test_a_single_pixel_beyond_the_range_is_told(scene: Scene) -> None:
+    truth = scene.truth[scene.ref].copy()
+    truth[50, 60] = scene.disparities.largest + 0.25
+    found = [finding for finding in check(evolve(scene, truth={scene.ref: truth})) if finding.verdict != "good"]
+    assert [(finding.topic, finding.verdict) for finding in found] == [(f"truth of {scene.ref}", "note")]
+    assert f"1 of {truth.size} pixels" in found[0].text
 
 
 @pytest.mark.parametrize(("down", "turn"), [(2.0, 0.0), (-1.5, 0.0), (0.0, 1.0)])

@@ -84,7 +84,8 @@ def test_whatever_a_method_does_costs_its_cell_alone(tmp_path: Path, isolation: 
 def test_an_endless_loop_is_stopped(tmp_path: Path) -> None:
     found = run(tmp_path / "run", "loops", timeout=5)
     status, reason, printed = EXPECTED["loops"]
-    assert (found.status["loops"], found.reason["loops"]) == (status, reason)
+    log = f"(log: cells/{found.cell['loops']}/log.txt)"
+    assert (found.status["loops"], found.reason["loops"]) == (status, f"{reason} {log}")
     assert printed in found.log["loops"]
 
 

@@ -118,7 +118,7 @@ def test_each_broken_promise_is_found_and_no_other(name: str, wrong: set[str]) -
         ("writes", "read-only"),
         ("exits", "ended its process (exit status 7)"),
         ("leaves", "SystemExit"),
-        ("raises", "the third digit is missing (methods.py:"),
+        ("raises", "the third digit is missing and more (methods.py:"),
         ("misshapen", "(3, 3)"),
         ("bare", "not an Estimate"),
         ("empty", "NaN everywhere"),
