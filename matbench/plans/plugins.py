@@ -16,6 +16,7 @@ from typing import Any, Literal
 from attrs import frozen
 
 from matbench.errors import UserError, unknown
+from matbench.files.own_folders import cache_folder
 from matbench.spec import first_line
 
 Group = Literal["algorithms", "datasets", "metrics"]
@@ -205,8 +206,7 @@ def kernel_cache() -> Path:
     digest = sha256(_versions().encode())
     for file in _package_files("matbench.algorithms"):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "matbench" / "kernels" / digest.hexdigest()[:16]
+    return cache_folder() / "kernels" / digest.hexdigest()[:16]
 
 
 def _package_files(module: str) -> list[Path]:

@@ -6,8 +6,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from matbench.errors import UserError, unknown
+from matbench.files.own_folders import data_folder
 from matbench.plans import plugins
-from matbench.scenes.catalogue import DATA_VARIABLE, group, is_pattern, user_root
+from matbench.scenes.catalogue import DATA_VARIABLE, group, is_pattern
 from matbench.scenes.dataset import Download
 from matbench.spec import expand
 
@@ -18,9 +19,9 @@ def fetch_root(data: str | Path | None = None) -> Path:
     Raises
     ------
     UserError
-        If it is there but no folder.
+        If it is there but no folder, or the person has no folder of their own.
     """
-    root = Path(data or os.environ.get(DATA_VARIABLE) or user_root()).expanduser()
+    root = Path(data or os.environ.get(DATA_VARIABLE) or data_folder()).expanduser()
     if root.exists() and not root.is_dir():
         raise UserError(f"data folder {str(root)!r} is a file: name a folder, or one to be made")
     return root.resolve()

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import ModuleType
 
+from matbench.errors import UserError
 from matbench.plans import plugins
 
 
@@ -24,7 +25,7 @@ def without_main() -> Iterator[None]:
 def kernels_kept() -> Iterator[None]:
     """Let the processes started meanwhile keep compiled kernels where no other code's are."""
     before = os.environ.get("NUMBA_CACHE_DIR")
-    with suppress(OSError):  # without a folder to keep them in, kernels are compiled anew
+    with suppress(OSError, UserError):  # without a folder to keep them in, kernels are compiled anew
         place = plugins.kernel_cache()
         place.mkdir(parents=True, exist_ok=True)
         os.environ["NUMBA_CACHE_DIR"] = str(place)
