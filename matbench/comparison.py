@@ -153,7 +153,7 @@ class Comparison:
             kept = outcome is not None and outcome.has_volume
             return self.store.volume(stored[algorithm, params, scene, seed]) if kept else None
 
-        page.write(
+        page.write_page(
             path,
             page.Report(
                 title=self.folder.resolve().name,

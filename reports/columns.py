@@ -54,8 +54,8 @@ class Drawn:
 
 
 @contextmanager
-def look() -> Iterator[None]:
-    """Small print for whatever is drawn and written meanwhile."""
+def small_print() -> Iterator[None]:
+    """Draw and write with the letters and lines of a paper's column, as long as the block lasts."""
     from matplotlib import rc_context
 
     settings: Any = _LOOK
@@ -72,13 +72,13 @@ def letter(number: int) -> str:
     return (letter(number // 26 - 1) if number >= 26 else "") + chr(ord("a") + number % 26)
 
 
-def write(drawn: Drawn, stem: Path) -> list[Path]:
+def write_figure(drawn: Drawn, stem: Path) -> list[Path]:
     """Write a figure as PDF and PNG, its caption as text, and what a paper includes as LaTeX; the four paths."""
     paths = [stem.with_name(stem.name + ending) for ending in (".pdf", ".png", ".txt", ".tex")]
     for path in paths[:2]:
         out = io.BytesIO()
         undated = {"CreationDate": None} if path.suffix == ".pdf" else {}
-        with look():
+        with small_print():
             drawn.figure.savefig(out, format=path.suffix[1:], metadata=undated)
         write_bytes(path, out.getvalue())
     write_text(paths[2], drawn.caption + "\n")

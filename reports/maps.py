@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from matbench.errors import UserError
 from matbench.recording import coloring
-from matbench.reports.columns import INCHES, TALLEST, Drawn, Width, letter, look
+from matbench.reports.columns import INCHES, TALLEST, Drawn, Width, letter, small_print
 from matbench.reports.figures import printable
 from matbench.scene import Scene
 from matbench.spec import read_scene
@@ -64,7 +64,7 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Drawn:
     heights = [side * shape for shape in shapes]
     tall = sum(len(rows) * (height + 0.03) + 0.24 for height in heights)
     margin = (inches - across * side) / 2 + 0.08
-    with look():
+    with small_print():
         figure = Figure(figsize=(inches, tall))
         below = tall
         for line, height in zip(lines, heights, strict=True):

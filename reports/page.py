@@ -22,12 +22,12 @@ from matbench.reports.numbers import COSTS, Numbers
 from matbench.reports.pictures import gallery
 from matbench.reports.tables import METRIC, REGION, Shared
 
-__all__ = ["Report", "render", "write"]
+__all__ = ["Report", "render", "write_page"]
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def write(path: Path, report: Report) -> None:
+def write_page(path: Path, report: Report) -> None:
     """Write the page of a run, whole or not at all."""
     write_text(path, render(report))
 

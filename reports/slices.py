@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from matbench.algorithm import Estimate
 from matbench.recording import coloring, drawing
 from matbench.recording.probe import RecordingProbe
-from matbench.reports.columns import INCHES, Drawn, Width, letter, look
+from matbench.reports.columns import INCHES, Drawn, Width, letter, small_print
 from matbench.scene import Scene
 from matbench.space import DisparitySpace
 
@@ -21,8 +21,8 @@ SLICE_HEIGHT = 0.55  # inches, in a column
 
 
 @frozen(eq=False)
-class Slice:
-    """One kind of slice.
+class Panel:
+    """One kind of slice, as a panel of the figure.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class EpipolarPlane:
     row: int
     space: DisparitySpace
     views: tuple[int, ...]
-    slices: tuple[Slice, ...]
+    slices: tuple[Panel, ...]
     passes: int
 
     @property
@@ -71,26 +71,26 @@ def epipolar_plane(scene: Scene, probe: RecordingProbe, estimate: Estimate) -> E
     Slices are those of the last pass.
     """
     (row, *_), labels = probe.wanted.rows, scene.labels
-    found: list[Slice] = []
+    found: list[Panel] = []
     similarity, volume = probe.similarity(labels), estimate.volume
     if similarity is not None:
-        found.append(Slice("similarity", similarity.picture[0], f"similarity of the pairs {_named(similarity.names)}"))
+        found.append(Panel("similarity", similarity.picture[0], f"similarity of the pairs {_named(similarity.names)}"))
     if volume is not None:
         seen = probe.visibility(volume, labels)
-        found.append(Slice("visibility", seen.picture[0], f"visibility in the views {_named(seen.names)}"))
+        found.append(Panel("visibility", seen.picture[0], f"visibility in the views {_named(seen.names)}"))
         grey = drawing.as_bytes(probe.slices_of(volume).values[0])
-        found.append(Slice("materiality", np.repeat(grey[:, :, None], 3, axis=2), "materiality, white is high"))
+        found.append(Panel("materiality", np.repeat(grey[:, :, None], 3, axis=2), "materiality, white is high"))
     slopes = next((f.derivative for f in reversed(probe.frames) if f.derivative is not None), None)
     if slopes is not None:
         meaning = "energy derivative according to materiality: red negative, blue positive, black zero"
-        found.append(Slice("energy derivative", drawing.sign_colors(slopes[0]), meaning))
+        found.append(Panel("energy derivative", drawing.sign_colors(slopes[0]), meaning))
     where = volume or probe.latest
     if not found or where is None:
         return None
     space = where.space
-    alike = tuple(s for s in found if s.picture.shape[:2] == space.shape[1:])
+    same_size = tuple(s for s in found if s.picture.shape[:2] == space.shape[1:])
     told = max((len(values) for values in probe.energies.values()), default=0)
-    return EpipolarPlane(row, space, where.views, alike, told)
+    return EpipolarPlane(row, space, where.views, same_size, told)
 
 
 def _named(names: tuple[str, ...]) -> str:
@@ -112,7 +112,7 @@ def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column
     truth = scene.truth.get(scene.ref)
     top = inches * (0.46 if truth is not None else 0.6) * scene.height / scene.width + 0.2
     each = SLICE_HEIGHT * (inches / INCHES["column"]) ** 0.5
-    with look():
+    with small_print():
         figure = Figure(figsize=(inches, top + count * (each + 0.14) + 0.3))
         figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.04, wspace=0.02, hspace=0.02)
         upper, lower = figure.subfigures(2, 1, height_ratios=[top, count * (each + 0.14) + 0.3], squeeze=False)[:, 0]
@@ -151,7 +151,7 @@ def _top(figure: Any, scene: Scene, row: int, truth: NDArray[np.float32] | None)
     return [pictures[0][2] + f", row {row} in yellow", *(meaning for _, _, meaning in pictures[1:])]
 
 
-def _draw_slice(axis: "Axes", plane: EpipolarPlane, one: Slice, title: str) -> None:
+def _draw_slice(axis: "Axes", plane: EpipolarPlane, one: Panel, title: str) -> None:
     space, half = plane.space, 0.5 / plane.space.fineness
     left = space.origin / space.fineness
     low, high = (float(d) / plane.step for d in space.disparities[[0, -1]])

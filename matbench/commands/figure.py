@@ -241,5 +241,5 @@ def _stem(out: Path | None, run: Path, name: str) -> Path:
 def _write(drawn: "Drawn", stem: Path, console: Console) -> None:
     from matbench.reports import columns
 
-    for path in columns.write(drawn, stem):
+    for path in columns.write_figure(drawn, stem):
         console.say(f"{path.suffix[1:]}: {path}")

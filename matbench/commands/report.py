@@ -61,7 +61,7 @@ def report(
         format = ending
     if out is not None and not out.parent.is_dir():
         raise UserError(f"folder {str(out.parent)!r} of --out does not exist")
-    results, cells = paper.read(run)
+    results, cells = paper.read_run(run)
     higher = any(m.name == metric and m.better == "higher" for m in scores.metrics())
     made = paper.sheet(results, cells, metric, higher, region or (), scenes)
     console = Console()
@@ -69,7 +69,7 @@ def report(
         for table in terminal.tables(results, cells, metric, higher, console.width):
             console.print(table)
         return DONE
-    text = paper.write(made, format)
+    text = paper.formatted(made, format)
     if out is None:
         sys.stdout.write(text)
     else:

@@ -120,17 +120,17 @@ def check(name: str, *, data: Data = None) -> int:
 
     from matbench.datasets.folder import describe
     from matbench.scenes.catalogue import load_scene, own_folder
-    from matbench.scenes.scene_check import Finding, check
+    from matbench.scenes.scene_check import Observation, check
     from matbench.spec import parse
 
     console, problems, files = Console(), 0, None
     marks = {"good": ("✓", "green"), "note": ("•", "yellow"), "problem": ("✗", "bold red"), "unknown": ("?", "yellow")}
 
-    def tell(finding: Finding) -> None:
+    def tell(observation: Observation) -> None:
         nonlocal problems
-        problems += finding.verdict == "problem"
-        mark, style = marks[finding.verdict]
-        line = Text.assemble((f"{mark} ", style), (f"{finding.topic}: ", "bold"), finding.text)
+        problems += observation.verdict == "problem"
+        mark, style = marks[observation.verdict]
+        line = Text.assemble((f"{mark} ", style), (f"{observation.topic}: ", "bold"), observation.text)
         console.print(line, soft_wrap=True, highlight=False)
 
     spec = parse(name)[0]
@@ -139,16 +139,16 @@ def check(name: str, *, data: Data = None) -> int:
         if folder is not None:
             stored = describe(folder)
             for problem in stored.problems():
-                tell(Finding("files", "problem", problem))
+                tell(Observation("files", "problem", problem))
             if problems:
                 return FAILED
             files = dict(zip(stored.labels, (path.name for path in stored.views), strict=True))
         scene = load_scene(name, data)
         size = f"{scene.n} views of {scene.width}x{scene.height} px"
-        tell(Finding("files", "good", f"{size}, reference view {scene.labels[scene.ref]}"))
+        tell(Observation("files", "good", f"{size}, reference view {scene.labels[scene.ref]}"))
         status.update("matching features, warping views")
-        for finding in check(scene, [files[label] for label in scene.labels] if files else None):
-            tell(finding)
+        for observation in check(scene, [files[label] for label in scene.labels] if files else None):
+            tell(observation)
     console.say(f"{problems} problem{'s' if problems != 1 else ''}" if problems else "no problems")
     return FAILED if problems else DONE
 

@@ -27,8 +27,8 @@ _TRIAL_PIXELS = 200_000  # rivals of the truth are tried on every k-th row
 
 
 @frozen
-class Finding:
-    """One thing that was looked at.
+class Observation:
+    """One thing that was looked at in a scene. (What a check of a method finds is another class.)
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Finding:
     text: str
 
 
-def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Finding]:
+def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Observation]:
     """Look at a scene's order of views, direction of shift, rows and truth, one after the other.
 
     Parameters
@@ -66,7 +66,7 @@ def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Finding]
     yield _rows(matches, called)
     yield from _borders(scene, called)
     if not scene.truth:
-        yield Finding(
+        yield Observation(
             "truth", "note", "there is none: a comparison needs [predict=left] or [predict=right] after the scene"
         )
     for view in sorted(scene.truth):
@@ -90,76 +90,78 @@ def _inside(scene: Scene, disparities: NDArray[np.float64]) -> float:
     return float(np.mean(held)) if len(held) else 0.0
 
 
-def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | None) -> Finding:
+def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | None) -> Observation:
     if scene.n == 2:
-        return Finding("order", "good", "two views: their order is what the direction of the shift shows")
+        return Observation("order", "good", "two views: their order is what the direction of the shift shows")
     if places is None or np.isfinite(places).sum() < 3:
-        return Finding("order", "unknown", "too few features are found again in other views to tell their order")
+        return Observation("order", "unknown", "too few features are found again in other views to tell their order")
     known = [view for view in range(scene.n) if np.isfinite(places[view])]
     if not _follow(places):
         order = sorted(known, key=lambda view: places[view])
-        return Finding(
+        return Observation(
             "order", "problem", f"the views do not follow one another: list {_list([names[v] for v in order])}"
         )
     away = np.abs(places - (np.arange(scene.n) - scene.ref))
     worst = int(np.nanargmax(away))
     text = f"view {names[worst]} was taken {places[worst] - places[scene.ref]:.2f} steps from {names[scene.ref]}"
     if away[worst] > WRONG_STEP:
-        return Finding("order", "problem", f"views are not evenly spaced: {text}, not {worst - scene.ref}")
+        return Observation("order", "problem", f"views are not evenly spaced: {text}, not {worst - scene.ref}")
     if away[worst] > NOTED_STEP:
-        return Finding("order", "note", f"views are not quite evenly spaced: {text}, not {worst - scene.ref}")
+        return Observation("order", "note", f"views are not quite evenly spaced: {text}, not {worst - scene.ref}")
     left = _list([names[view] for view in range(scene.n) if view not in known])
     unsure = f"; too few features in {left}" if left else ""
-    return Finding("order", "good", f"from one side to the other, within {away[worst]:.2f} of a step{unsure}")
+    return Observation("order", "good", f"from one side to the other, within {away[worst]:.2f} of a step{unsure}")
 
 
-def _direction(scene: Scene, found: NDArray[np.float64]) -> Finding:
+def _direction(scene: Scene, found: NDArray[np.float64]) -> Observation:
     if len(found) < alignment.ENOUGH:
-        return Finding("shift", "unknown", "too few features are found again in other views to tell their disparities")
+        return Observation(
+            "shift", "unknown", "too few features are found again in other views to tell their disparities"
+        )
     inside, mirrored = _inside(scene, found), _inside(scene, -found)
     low, high = np.quantile(found, (0.02, 0.98))
     measured = f"features have {low:.1f} .. {high:.1f} px per view step"
     if inside >= IN_RANGE:
         unsure = "; the range holds either direction, so that only truth can tell it" if mirrored >= IN_RANGE else ""
-        return Finding("shift", "good", f"{measured}, the range is {scene.disparities}{unsure}")
+        return Observation("shift", "good", f"{measured}, the range is {scene.disparities}{unsure}")
     if mirrored >= max(IN_RANGE, inside + _CLEAR_SHARE):
-        return Finding(
+        return Observation(
             "shift",
             "problem",
             f"points move the wrong way: {measured}, the range is {scene.disparities}. Views must be listed from left "
             "to right, so that nearer points move left from one view to the next: list them the other way round",
         )
     share = f"{100 * (1 - inside):.0f} %"
-    return Finding("shift", "problem", f"{share} of them lie outside the range {scene.disparities}: {measured}")
+    return Observation("shift", "problem", f"{share} of them lie outside the range {scene.disparities}: {measured}")
 
 
-def _rows(matches: Mapping[int, Matches], names: Sequence[str]) -> Finding:
+def _rows(matches: Mapping[int, Matches], names: Sequence[str]) -> Observation:
     found = {view: rows for view, moved in matches.items() if (rows := alignment.rows(moved)) is not None}
     if not found:
-        return Finding("rows", "unknown", "too few features are found again in other views to tell their rows")
+        return Observation("rows", "unknown", "too few features are found again in other views to tell their rows")
     worst = max(found, key=lambda view: found[view].worst)
     rows = found[worst]
     if rows.worst <= NOTED_ROWS:
-        return Finding("rows", "good", f"level within {rows.worst:.2f} px")
+        return Observation("rows", "good", f"level within {rows.worst:.2f} px")
     side = "lower" if rows.offset > 0 else "higher"
     text = f"view {names[worst]} lies {abs(rows.offset):.2f} px {side} than the reference view"
     turned = ", and is turned or scaled" if rows.worst > 2 * abs(rows.offset) + NOTED_ROWS else ""
     text += f"{turned}: up to {rows.worst:.2f} px between rows"
     wrong = rows.worst > WRONG_ROWS
-    return Finding("rows", "problem" if wrong else "note", text + ("; rectify the views first" if wrong else ""))
+    return Observation("rows", "problem" if wrong else "note", text + ("; rectify the views first" if wrong else ""))
 
 
-def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
+def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Observation]:
     lost = {}
     for name, view in zip(names, scene.views, strict=True):
         first, last = picture_columns(view)
         lost[name] = scene.width - 1 - last + first
     black = ", ".join(f"{name} ({count})" for name, count in lost.items() if count)
     if black:
-        yield Finding("borders", "note", f"views end in black columns, which match nothing: {black}")
+        yield Observation("borders", "note", f"views end in black columns, which match nothing: {black}")
 
 
-def _truth(scene: Scene, name: str) -> Iterator[Finding]:
+def _truth(scene: Scene, name: str) -> Iterator[Observation]:
     topic = f"truth of {name}"
     truth = scene.truth[scene.ref]
     known = truth[np.isfinite(truth)]
@@ -170,23 +172,23 @@ def _truth(scene: Scene, name: str) -> Iterator[Finding]:
         text = (
             f"{100 * (1 - held):.0f} % of it lies outside the range {scene.disparities}: it is {ends} px per view step"
         )
-        yield Finding(topic, "problem", text)
+        yield Observation(topic, "problem", text)
     error = together(warping_errors(scene))
     if error is None or error.pixels < LEAST_SEEN * (scene.n - 1) * known.size:
-        yield Finding(topic, "problem", "it leads out of the other views nearly everywhere: is its scale right?")
+        yield Observation(topic, "problem", "it leads out of the other views nearly everywhere: is its scale right?")
         return
     at = error.mean
     said = f"warped views differ by {at[1]:.2f} grey levels, {at[0]:.2f} and {at[2]:.2f} with it 1 px of the pair off"
     rival = _better(scene)
     if rival is not None:
-        yield Finding(topic, "problem", f"{said}. The views are explained better {rival}")
+        yield Observation(topic, "problem", f"{said}. The views are explained better {rival}")
     elif at[1] >= min(at[0], at[2]):
         way = "smaller" if at[0] < at[2] else "larger"
-        yield Finding(topic, "problem", f"{said}: {way} disparities explain the views better")
+        yield Observation(topic, "problem", f"{said}: {way} disparities explain the views better")
     else:
         best = _vertex(error)
         text = f"; {best:+.1f} px would explain them best" if abs(best) > NOTED_SHIFT else ""
-        yield Finding(topic, "note" if text else "good", said + text)
+        yield Observation(topic, "note" if text else "good", said + text)
 
 
 def _vertex(error: WarpingError) -> float:

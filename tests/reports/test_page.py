@@ -42,7 +42,7 @@ def data_of(html: str) -> Any:
 
 
 def test_one_file_without_addresses(report: Report, tmp_path: Path) -> None:
-    page.write(tmp_path / "report.html", report)
+    page.write_page(tmp_path / "report.html", report)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "http:" not in html
@@ -160,7 +160,7 @@ def test_ten_methods_on_ten_scenes_of_quarter_size_stay_below_15_MB(report: Repo
     results = pd.concat([first.assign(algorithm=m, scene=s) for m, s in both])
     cells = pd.concat([ran.assign(algorithm=m, scene=s) for m, s in both])
     before = time.process_time()
-    page.write(tmp_path / "report.html", evolve(report, results=results, cells=cells, maps=maps, scenes=scenes))
+    page.write_page(tmp_path / "report.html", evolve(report, results=results, cells=cells, maps=maps, scenes=scenes))
     size = (tmp_path / "report.html").stat().st_size
     print(f"{size / 1e6:.1f} MB, {time.process_time() - before:.1f} s of CPU time")
     assert size < 15e6

@@ -59,7 +59,7 @@ def _volume(report: Report) -> Any:
 @pytest.fixture
 def shown(browser: Any, report: Report, tmp_path: Path) -> Any:
     """The made-up run's page, opened and drawn."""
-    page.write(tmp_path / "report.html", evolve(report, volumes=_volume(report)))
+    page.write_page(tmp_path / "report.html", evolve(report, volumes=_volume(report)))
     browser.get_log("browser")
     browser.get_log("performance")
     browser.set_window_size(1366, 900)

@@ -50,7 +50,7 @@ def from_tex(text: str) -> list[list[str]]:
 
 def test_all_formats_have_the_same_numbers_in_the_same_places(report: Report) -> None:
     sheet = made(awkward(report))
-    found = {f: paper.write(sheet, f) for f in paper.FORMATS}
+    found = {f: paper.formatted(sheet, f) for f in paper.FORMATS}
     rows = {"csv": from_csv(found["csv"]), "md": from_md(found["md"]), "tex": from_tex(found["tex"])}
     assert len(rows["csv"]) == 9, "three methods: their means and two scenes"
     numbers = {
@@ -163,7 +163,7 @@ def run(report: Report, tmp_path: Path) -> Path:
 
 
 def test_tables_read_back_give_the_same_sheet(report: Report, run: Path) -> None:
-    pd.testing.assert_frame_equal(paper.sheet(*paper.read(run)).texts, made(report).texts)
+    pd.testing.assert_frame_equal(paper.sheet(*paper.read_run(run)).texts, made(report).texts)
 
 
 def matbench(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
@@ -211,4 +211,4 @@ def test_a_folder_that_is_no_finished_run(run: Path, capsys: pytest.CaptureFixtu
     assert "is damaged" in matbench(capsys, "report", str(run))[2]
     (run / "results.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UserError, match="is damaged"):
-        paper.read(run)
+        paper.read_run(run)

@@ -136,10 +136,10 @@ def test_many_scenes_go_on_in_the_next_line_until_the_page_is_full() -> None:
 def test_hostile_names_are_only_letters(tmp_path: Path) -> None:
     scene = made("made/$x$_^{\\a}%<b>", truth=False)
     drawn = maps.draw(maps.Maps((scene,), ("$m_1",), {("$m_1", scene.name): np.zeros((16, 24), np.float32)}))
-    paths = columns.write(drawn, tmp_path / "f")
+    paths = columns.write_figure(drawn, tmp_path / "f")
     assert [path.suffix for path in paths] == [".pdf", ".png", ".txt", ".tex"]
     assert r"\$m\_1" in paths[3].read_text()
-    again = columns.write(drawn, tmp_path / "g")
+    again = columns.write_figure(drawn, tmp_path / "g")
     assert paths[0].read_bytes() == again[0].read_bytes()
 
 

@@ -10,7 +10,7 @@ from attrs import evolve
 from matbench import load_scene
 from matbench.scene import Range, Scene
 from matbench.scenes.alignment import match, places, rows
-from matbench.scenes.scene_check import Finding, check
+from matbench.scenes.scene_check import Observation, check
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def scene() -> Scene:
     return load_scene("synthetic/box[n=6 size=320x240]")
 
 
-def _found(scene: Scene) -> dict[str, Finding]:
+def _found(scene: Scene) -> dict[str, Observation]:
     return {finding.topic: finding for finding in check(scene)}
 
 
