@@ -1,13 +1,14 @@
-"""Write what is known of every Middlebury scene and file: ``middlebury.json``, from a manifest.
+"""Rewrite the registry of Middlebury scenes and files, ``middlebury.json``, from a manifest.
 
     python -m matbench.datasets.make_registry MANIFEST.json
 
-The registry's layouts (how the files of a set are named, what their grey levels mean, where they
-can be had) are kept by hand in ``middlebury.json`` itself; this replaces its scenes by those of a
-manifest, and refuses a manifest that contradicts the layouts. A manifest maps
-``middlebury/FOLDER/SCENE`` to its ``facts`` and ``files``; a file has ``bytes``, ``sha256`` and
-``pixels``, the digest of `images.pixel_digests`. Files that hold no picture are left out: nothing
-reads them.
+A manifest is a list of all scenes and files. It maps ``middlebury/FOLDER/SCENE`` to the scene's ``facts``
+and ``files``; a file has ``bytes``, ``sha256`` and ``pixels``, the digest of `images.pixel_digests`. Files
+that hold no picture are left out: nothing reads them.
+
+The layouts (how files are named, what grey levels mean, where files can be downloaded) are written by
+hand in ``middlebury.json``. They stay as they are; only the scenes are replaced. A manifest that
+contradicts the layouts is refused.
 """
 
 import json
@@ -25,7 +26,7 @@ DIGITS = 4  # of a disparity in a manifest, before it is taken for a whole numbe
 
 
 def scenes(year: str, manifest: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Scene -> size -> facts and files of one year's set.
+    """One year's scenes as the registry stores them: scene -> size -> facts and files.
 
     Raises
     ------
@@ -79,7 +80,7 @@ def _facts(path: str, layout: Layout, entry: Mapping[str, Any]) -> dict[str, Any
 
 
 def text(everything: Mapping[str, Any]) -> str:
-    """JSON with one line a file and one a layout."""
+    """The registry as JSON, with one line for each file and each layout: changes are easy to review."""
 
     def lines(value: Any, depth: int) -> str:
         flat = json.dumps(value)
@@ -94,7 +95,18 @@ def text(everything: Mapping[str, Any]) -> str:
 
 
 def main(manifest: Path) -> None:
-    """Rewrite the registry."""
+    """Rewrite the scenes of ``middlebury.json``.
+
+    Parameters
+    ----------
+    manifest
+        Path of the manifest.
+
+    Raises
+    ------
+    UserError
+        If the manifest contradicts the layouts.
+    """
     everything = json.loads(REGISTRY.read_text("utf-8"))
     known = json.loads(manifest.read_text("utf-8"))
     for year in YEARS:

@@ -1,7 +1,8 @@
 """What is known of the Middlebury scenes without their files: ``middlebury.json``.
 
-Per set and size how files are named, what grey levels mean and where all can be had (`Layout`);
-per scene and size what differs, and a digest of every file (`Facts`).
+For each set and size: how files are named, what the grey levels of the truth mean, and where the files
+can be downloaded (`Layout`). For each scene and size: what differs from scene to scene, and a digest of
+every file (`Facts`).
 """
 
 import json
@@ -19,33 +20,33 @@ YEARS = ("2001", "2003", "2005", "2006")
 
 @frozen
 class Layout:
-    """How the files of a scene are named, what its truth means, and where it can be had.
+    """How the files of a scene are named, what its truth means, and where it can be downloaded.
 
     Parameters
     ----------
     folder
-        Where the scenes lie, below ``middlebury``.
+        Folder of the scenes, below ``middlebury`` in the data root.
     numbers
         Numbers of the views in file names, left to right.
     pair
         Numbers of the two views of the field's pair, the reference view first.
     grey
-        Grey levels of truth for one pixel of the pair.
+        Grey levels of the truth for one pixel of disparity between the two views of the pair.
     sources
-        Below the site, best first, the scene's name as ``{scene}``: zip archives of all or some of
-        its files, and folders (ending in a slash) of single files.
+        Paths below the site, tried in this order; ``{scene}`` stands for the scene's name. A path is a
+        zip archive with all or some of the files or, if it ends in a slash, a folder of single files.
     view, truth
-        File names without extension, the view's number as ``{}``.
+        File names without extension; ``{}`` stands for the view's number.
     alias
-        What a view may be called where it is offered, if something else.
+        Another file name that the site may use for a view, as in `view`; None if there is none.
     unknown
         The grey level that means unknown; None if there is none.
     largest
-        Largest disparity to search, px of the pair; None takes it from the truth.
+        Largest disparity to search, px of the pair; None: it is taken from the scene's truth.
     label
-        What a view is called.
+        What a view is called in tables and figures; ``{}`` stands for its number.
     with_truth
-        Numbers of the views whose truth may exist, if not those of the pair.
+        Numbers of the views that can have truth; by default those of the pair.
     """
 
     folder: str
@@ -77,13 +78,14 @@ class Facts:
     Parameters
     ----------
     size
-        (width, height) in pixels, if that is known.
+        (width, height) in pixels; None if it is not known.
     truth
         Numbers of the views that have truth.
     largest
         Largest disparity to search, px of the pair.
     files
-        Name -> bytes, SHA-256, and pixel digest (`images.pixel_digests`).
+        File name -> size in bytes, SHA-256 of the file, and SHA-256 of its pixels
+        (`images.pixel_digests`), which is the same for a PNG and a PPM of one picture.
     """
 
     size: tuple[int, int] | None
@@ -94,7 +96,17 @@ class Facts:
 
 @frozen
 class Registry:
-    """One year of ``middlebury.json``; `special` are scenes laid out in a way of their own."""
+    """One year of ``middlebury.json``.
+
+    Parameters
+    ----------
+    layouts
+        Size -> the layout of its scenes.
+    special
+        Scene -> its own layout, where it differs from that of the other scenes.
+    scenes
+        Scene -> size -> facts.
+    """
 
     layouts: Mapping[str, Layout]
     special: Mapping[str, Layout]
@@ -108,7 +120,7 @@ def _read() -> Mapping[str, Any]:
 
 
 def site() -> str:
-    """The official site's URL; below it lie the folders and sources of the layouts."""
+    """URL of the official site; the sources of a `Layout` are paths below it."""
     return str(_read()["site"])
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from matbench.errors import UserError
 from matbench.recording import coloring
 from matbench.reports.page_figures import printable
-from matbench.reports.paper_figure import INCHES, TALLEST, CaptionedFigure, Width, letter, look
+from matbench.reports.paper_figure import INCHES, TALLEST, CaptionedFigure, Width, letter, small_print
 from matbench.scene import Scene
 from matbench.spec import read_scene
 
@@ -64,7 +64,7 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Captioned
     heights = [side * shape for shape in shapes]
     tall = sum(len(rows) * (height + 0.03) + 0.24 for height in heights)
     margin = (inches - across * side) / 2 + 0.08
-    with look():
+    with small_print():
         figure = Figure(figsize=(inches, tall))
         below = tall
         for line, height in zip(lines, heights, strict=True):

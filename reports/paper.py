@@ -4,8 +4,6 @@
 last digit.
 """
 
-import csv
-import io
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -82,7 +80,7 @@ def _judged(regions: Sequence[str]) -> str:
     return REGION if REGION in regions else regions[0]
 
 
-def read(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     """``results.csv`` and ``cells.csv`` of a finished run; its scenes are not needed.
 
     Raises
@@ -212,14 +210,11 @@ def formatted(made: Sheet, format: Format) -> str:
 
 
 def comma_separated(made: Sheet) -> str:
-    """CSV: one row for each scene and method, `MEAN` first. The column ``note`` says why a number is missing."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*made.texts.columns, "metric", "unit", "note"])
-    for row in made.texts.to_dict("records"):
-        note = made.unranked.get(row["method"], "") if row["scene"] == MEAN else ""
-        writer.writerow(["" if v == NONE else v for v in row.values()] + [made.metric, made.unit, note])
-    return out.getvalue()
+    """One row for each scene and method, `MEAN` first; what was left without a number is told in ``note``."""
+    notes = made.texts["method"].map(dict(made.unranked)).where(made.texts["scene"] == MEAN)
+    more = pd.DataFrame({"metric": made.metric, "unit": made.unit, "note": notes})
+    # not `assign`: a region may be called "note"
+    return pd.concat([made.texts.replace(NONE, ""), more], axis=1).to_csv(index=False, lineterminator="\n")
 
 
 def _heads(made: Sheet) -> list[str]:
@@ -304,6 +299,7 @@ def latex(made: Sheet) -> str:
     """A floating table for ``\\usepackage{booktabs}`` and ``\\usepackage[T1]{fontenc}``, notes below it."""
     marks = {0: "{}", 1: r"\textbf{{{}}}", 2: r"\underline{{{}}}"}
     heads, left = _heads(made), 2 if made.has_scenes else 1
+    # not pandas' Styler, as in `switches`: it sets no rule between the scenes and no notes below the table
     lines = [
         r"% needs \usepackage[T1]{fontenc}, \usepackage{textcomp} and \usepackage{booktabs}",
         r"\begin{table}",

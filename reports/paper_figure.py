@@ -54,7 +54,7 @@ class CaptionedFigure:
 
 
 @contextmanager
-def look() -> Iterator[None]:
+def small_print() -> Iterator[None]:
     """A context in which figures are drawn and saved with the small print of a paper."""
     from matplotlib import rc_context
 
@@ -78,7 +78,7 @@ def write_figure(drawn: CaptionedFigure, stem: Path) -> list[Path]:
     for path in paths[:2]:
         out = io.BytesIO()
         undated = {"CreationDate": None} if path.suffix == ".pdf" else {}
-        with look():
+        with small_print():
             drawn.figure.savefig(out, format=path.suffix[1:], metadata=undated)
         write_bytes(path, out.getvalue())
     write_text(paths[2], drawn.caption + "\n")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from matbench.algorithm import Estimate
 from matbench.recording import coloring, reduction
 from matbench.recording.probe import CapturingProbe
-from matbench.reports.paper_figure import INCHES, CaptionedFigure, Width, letter, look
+from matbench.reports.paper_figure import INCHES, CaptionedFigure, Width, letter, small_print
 from matbench.scene import Scene
 from matbench.space import DisparitySpace
 
@@ -87,9 +87,9 @@ def epipolar_plane(scene: Scene, probe: CapturingProbe, estimate: Estimate) -> E
     if not found or where is None:
         return None
     space = where.space
-    alike = tuple(s for s in found if s.picture.shape[:2] == space.shape[1:])
+    same_size = tuple(s for s in found if s.picture.shape[:2] == space.shape[1:])
     told = max((len(values) for values in probe.energies.values()), default=0)
-    return EpipolarPlane(row, space, where.views, alike, told)
+    return EpipolarPlane(row, space, where.views, same_size, told)
 
 
 def _named(names: tuple[str, ...]) -> str:
@@ -111,7 +111,7 @@ def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column
     truth = scene.truth.get(scene.ref)
     top = inches * (0.46 if truth is not None else 0.6) * scene.height / scene.width + 0.2
     each = SLICE_HEIGHT * (inches / INCHES["column"]) ** 0.5
-    with look():
+    with small_print():
         figure = Figure(figsize=(inches, top + count * (each + 0.14) + 0.3))
         figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.04, wspace=0.02, hspace=0.02)
         upper, lower = figure.subfigures(2, 1, height_ratios=[top, count * (each + 0.14) + 0.3], squeeze=False)[:, 0]

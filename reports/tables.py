@@ -165,10 +165,10 @@ def timed_alike(cells: pd.DataFrame) -> pd.Series:
 def timing_note(cells: pd.DataFrame) -> str:
     """A note if not all times can be compared; else empty."""
     ok = int((cells["status"] == "ok").sum())
-    alike = int(timed_alike(cells).sum())
-    if alike == ok:
+    compared = int(timed_alike(cells).sum())
+    if compared == ok:
         return ""
-    return f"time: of {alike} of {ok} cells; the others ran on another machine or not alone"
+    return f"time: of {compared} of {ok} cells; the others ran on another machine or not alone"
 
 
 def seconds(cells: pd.DataFrame, scope: Shared) -> pd.Series:

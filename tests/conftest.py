@@ -81,9 +81,11 @@ class Site:
         Path -> content; `folder` holds further files.
     faults
         Path -> what happens to the next requests, one fault each, the last one again and again if
-        it is in `forever`: an int is a status; ``("cut", n)`` breaks off after n bytes of the reply;
-        ``("stall", n)`` says nothing more after n bytes; ``("slow", n, s)`` waits s seconds before
-        each further kibibyte after n bytes; ``("headers", {...})`` replaces what is said of the body.
+        it is in `forever`: an int is a status; ``("busy", t)`` is 503 with ``Retry-After: t``;
+        ``("cut", n)`` breaks off after n bytes of the reply; ``("stall", n)`` says nothing more after n
+        bytes; ``("slow", n, s)`` waits s seconds before each further kibibyte after n bytes, and
+        ``("slow", n, s, m)`` before each further m bytes; ``("headers", {...})`` replaces what is said of
+        the body.
     moved
         Path -> where it is redirected to.
     ranges
@@ -144,6 +146,9 @@ class Site:
         faults = self.faults[path]
         fault = None if not faults else faults[0] if len(faults) == 1 and path in self.forever else faults.pop(0)
         content = self._content(path)
+        wait = None
+        if isinstance(fault, tuple) and fault[0] == "busy":
+            fault, wait = 503, fault[1]
         status = fault if isinstance(fault, int) else 200 if content is not None else 404
         body, headers = b"" if status >= 300 or content is None else content, {}
         if asked and status == 200 and self.ranges:
@@ -156,6 +161,7 @@ class Site:
         if path in self.moved:
             status, headers = 302, {"Location": self.moved[path]}
         headers["Content-Length"] = str(len(body))
+        headers["Retry-After"] = wait
         kind, *rest = fault if isinstance(fault, tuple) else (None,)
         if kind == "headers":
             headers |= rest[0]
@@ -173,12 +179,13 @@ class Site:
                 self.counting.discard(id(entry))
                 self.released.wait(60)
             if kind == "slow":
-                for at in range(whole, len(body), 1024):
+                piece = rest[2] if len(rest) > 2 else 1024
+                for at in range(whole, len(body), piece):
                     if self.released.wait(rest[1]):
                         return
-                    to.wfile.write(body[at : at + 1024])
+                    to.wfile.write(body[at : at + piece])
                     to.wfile.flush()
-                    entry[2] = min(at + 1024, len(body))
+                    entry[2] = min(at + piece, len(body))
         except OSError:  # the other side has gone
             pass
         finally:

@@ -55,7 +55,7 @@ def fetch(
         str | None, Parameter(help="Address that stands in for the official site's, laid out as that is.")
     ] = None,
     dry_run: Annotated[bool, Parameter(negative="", help="Only say what would be brought, and from where.")] = False,
-    timeout: Annotated[float, Parameter(help="Seconds of silence after which a connection has stalled.")] = 30,
+    timeout: Annotated[float, Parameter(help="Seconds of (almost) nothing after which a connection has stalled.")] = 30,
     retries: Annotated[int, Parameter(help="How often to try again while nothing more comes.")] = 4,
 ) -> int:
     """Download scenes, check every file, and put it where `compare` finds it.

@@ -61,7 +61,7 @@ def report(
         format = ending
     if out is not None and not out.parent.is_dir():
         raise UserError(f"folder {str(out.parent)!r} of --out does not exist")
-    results, cells = paper.read(run)
+    results, cells = paper.read_run(run)
     higher = any(m.name == metric and m.better == "higher" for m in scores.metrics())
     made = paper.sheet(results, cells, metric, higher, region or (), scenes)
     console = Console()

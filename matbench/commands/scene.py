@@ -122,14 +122,14 @@ def check(name: str, *, data: Data = None) -> int:
 
     from matbench.datasets.folder import describe
     from matbench.scenes.catalogue import load_scene, own_folder
-    from matbench.scenes.scene_check import Finding, check, conclusion
+    from matbench.scenes.scene_check import Observation, check, conclusion
     from matbench.spec import parse
 
     console, files = Console(), None
-    told: list[Finding] = []
+    told: list[Observation] = []
     marks = {"good": ("✓", "green"), "note": ("•", "yellow"), "problem": ("✗", "bold red"), "unknown": ("?", "yellow")}
 
-    def tell(finding: Finding) -> None:
+    def tell(finding: Observation) -> None:
         told.append(finding)
         mark, style = marks[finding.verdict]
         line = Text.assemble((f"{mark} ", style), (f"{finding.topic}: ", "bold"), finding.text)
@@ -141,13 +141,13 @@ def check(name: str, *, data: Data = None) -> int:
         if folder is not None:
             stored = describe(folder)
             for problem in stored.problems():
-                tell(Finding("files", "problem", problem))
+                tell(Observation("files", "problem", problem))
             if told:
                 return FAILED
             files = dict(zip(stored.labels, (path.name for path in stored.views), strict=True))
         scene = load_scene(name, data)
         size = f"{scene.n} views of {scene.width}x{scene.height} px"
-        tell(Finding("files", "good", f"{size}, reference view {scene.labels[scene.ref]}"))
+        tell(Observation("files", "good", f"{size}, reference view {scene.labels[scene.ref]}"))
         status.update("matching features, warping views")
         for finding in check(scene, [files[label] for label in scene.labels] if files else None):
             tell(finding)

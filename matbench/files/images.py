@@ -1,6 +1,6 @@
-"""Image files that come from elsewhere: read whole, or refused in one line.
+"""Reading image files that are not trusted: a file is read whole, or refused in one line.
 
-Decoders fill what is missing with grey and go on, so a file's completeness is checked first.
+Decoders fill missing rows with grey and report nothing, so each file is checked for completeness first.
 """
 
 import re
@@ -74,7 +74,8 @@ def read_levels(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.u
     Raises
     ------
     UserError
-        As `read_grey`, and if the decoder would spread fewer than 8 bits over 256 levels.
+        As `read_grey`, and if there are fewer than 8 bits a pixel: the decoder would stretch them to 256
+        levels, so that the stored levels are lost.
     """
     image = _read_image(path, size, 16)
     if (image != image[..., :1]).any():
@@ -122,8 +123,8 @@ def read_size(path: Path) -> tuple[int, int]:
 def pixel_digests(path: Path) -> set[str]:
     """SHA-256 of the decoded picture: the same for a PPM and a PNG of the same pixels.
 
-    Of the ASCII text ``HxWx3:uint8:`` and the bytes of the (H, W, 3) RGB array; where all pixels are
-    grey, also of ``HxW:uint8:`` and those of the (H, W) array.
+    What is hashed is the ASCII text ``HxWx3:uint8:`` followed by the bytes of the (H, W, 3) RGB array. If all
+    pixels are grey, there is a second digest, of ``HxW:uint8:`` and the bytes of the (H, W) array.
 
     Raises
     ------

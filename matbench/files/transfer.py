@@ -1,11 +1,13 @@
 """One file over HTTP: resumed where it broke off, tried again, given up in time.
 
-What has come so far lies beside the target as ``NAME.part`` and outlives a killed process. A server
-that supports ranges goes on from there; another starts anew.
+What has come so far lies beside the target as ``NAME.part``; it is kept when the process is killed.
+The next try asks the server for the rest. From a server that sends no parts of files, the whole file
+comes again.
 """
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,9 +18,12 @@ from matbench._version import __version__
 
 if TYPE_CHECKING:
     from requests import Response, Session
+    from urllib3 import Retry
 
 CHUNK = 1 << 14
 LONGEST_PAUSE = 30.0  # s
+LEAST = 1 << 10
+"""Bytes that must come within `Patience.timeout`, and that an attempt must add to count as progress."""
 
 
 class TransferError(Exception):
@@ -29,14 +34,6 @@ class NoAnswer(TransferError):
     """The server could not be reached, stalled or broke off, each time it was tried."""
 
 
-class _TryAgain(Exception):
-    """What may pass, and how long the server asks to wait, in seconds."""
-
-    def __init__(self, reason: str, pause: float = 0) -> None:
-        super().__init__(reason)
-        self.pause = pause
-
-
 @frozen
 class Patience:
     """How long to wait for a server.
@@ -44,11 +41,12 @@ class Patience:
     Parameters
     ----------
     timeout
-        Seconds without a single byte after which a connection has stalled.
+        Seconds within which a connection must bring `LEAST` bytes; else it has stalled.
     retries
         How often in a row to try again while nothing more comes.
     pause
-        Seconds before the first of them, doubled for each further one.
+        Seconds to wait before the first of these, doubled before each further one. A server that asks
+        for a longer pause (``Retry-After``) gets it. No pause is longer than `LONGEST_PAUSE`.
     """
 
     timeout: float = 30
@@ -82,7 +80,8 @@ def download(
     Returns
     -------
     bool
-        Did some of it, or all, come earlier, so that it may be of another file?
+        Did some of it, or all, come earlier? The site may have changed the file since, so that the two
+        parts are of different files: check the content.
 
     Raises
     ------
@@ -93,29 +92,25 @@ def download(
     OSError
         If it cannot be written, as on a full disk; the part stays.
     """
-    import pooch
-
-    pooch.get_logger().setLevel("WARNING")
+    if target.exists():
+        return True
+    target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f"{target.name}.part")
-    resumed = part.exists() or target.exists()
-
-    def bring(url: str, output: str, _: object) -> None:
-        try:
-            _persist(url, part, limit, patience, listen)
-        except NoAnswer:
-            raise
-        except TransferError:
-            part.unlink(missing_ok=True)
-            raise
-        part.replace(output)
-
-    pooch.retrieve(url, known_hash=None, fname=target.name, path=target.parent, downloader=bring)
+    resumed = part.exists()
+    try:
+        _persist(url, part, limit, patience, listen)
+    except NoAnswer:
+        raise
+    except TransferError:
+        part.unlink(missing_ok=True)
+        raise
+    part.replace(target)
     return resumed
 
 
 @cache
 def _session() -> "Session":
-    """Connections that are kept for further files of a server."""
+    """Connections that stay open for further files from the same server."""
     import requests
 
     session = requests.Session()
@@ -132,22 +127,47 @@ def _persist(
 ) -> None:
     """Try until the part is whole."""
     from requests import exceptions
+    from urllib3.exceptions import HTTPError, MaxRetryError
 
-    failures, most = 0, _size(part)
+    fresh = _retries(patience)
+    left, most = fresh, _size(part)
     while True:
         try:
             _attempt(url, part, limit, patience, listen)
             return
         except (exceptions.InvalidURL, exceptions.InvalidSchema, exceptions.TooManyRedirects) as error:
             raise TransferError(f"it cannot be fetched: {error}") from error
-        except (exceptions.RequestException, _TryAgain) as error:
-            if _size(part) > most:  # it came further than ever: the server is alive
-                failures, most = 0, _size(part)
-            failures += 1
-            if failures > patience.retries:
+        except (exceptions.RequestException, HTTPError) as error:
+            if _size(part) >= most + LEAST:  # it came further than ever: the server is alive
+                left, most = fresh, _size(part)
+            try:
+                left = left.increment()
+            except MaxRetryError:
                 raise NoAnswer(_reason(error)) from error
-            asked = error.pause if isinstance(error, _TryAgain) else 0
-            time.sleep(min(max(patience.pause * 2 ** (failures - 1), asked), LONGEST_PAUSE))
+            time.sleep(min(max(left.get_backoff_time(), _asked(left, error)), LONGEST_PAUSE))
+
+
+def _retries(patience: Patience) -> "Retry":
+    """How often to try again, and the pauses in between.
+
+    requests could count by itself (`HTTPAdapter`), but only until a reply begins: not when a body
+    breaks off, the usual case here.
+    """
+    from urllib3.util.retry import RequestHistory, Retry
+
+    # urllib3 waits from the second failure on; with one in the history it waits after the first, too
+    before = (RequestHistory("GET", None, None, None, None),)
+    return Retry(patience.retries, backoff_factor=patience.pause / 2, backoff_max=LONGEST_PAUSE, history=before)
+
+
+def _asked(left: "Retry", error: Exception) -> float:
+    """Seconds that the server asks to wait by ``Retry-After``; 0 if it does not, or not in a known form."""
+    from urllib3.exceptions import InvalidHeader
+
+    response = getattr(error, "response", None)
+    with suppress(InvalidHeader):
+        return 0 if response is None else left.get_retry_after(response.raw) or 0
+    return 0
 
 
 def _attempt(
@@ -158,6 +178,8 @@ def _attempt(
     listen: Callable[[int, int | None], None],
 ) -> None:
     """One request: the part is whole afterwards."""
+    from requests.exceptions import RequestException
+
     offset = _size(part)
     headers = {"Range": f"bytes={offset}-"} if offset else {}
     with _session().get(url, headers=headers, stream=True, timeout=patience.timeout) as response:
@@ -165,17 +187,16 @@ def _attempt(
             if response.headers.get("Content-Range") == f"bytes */{offset}":
                 return
             part.unlink()
-            raise _TryAgain("the file has changed since its first part came")
+            raise RequestException("the file has changed since its first part came")
         if response.status_code in (408, 425, 429) or response.status_code >= 500:
-            pause = response.headers.get("Retry-After", "")
-            raise _TryAgain(_status(response), float(pause) if pause.isdecimal() else 0)
+            raise RequestException(_status(response), response=response)
         if response.status_code not in (200, 206):
             raise TransferError(_status(response))
         if response.status_code == 200:
             offset = 0
         elif not response.headers.get("Content-Range", "").startswith(f"bytes {offset}-"):
             part.unlink(missing_ok=True)
-            raise _TryAgain("the server sent another part than the one asked for")
+            raise RequestException("the server sent another part than the one asked for")
         length = response.headers.get("Content-Length", "")
         is_plain = "Content-Encoding" not in response.headers  # lengths are those of the file
         total = offset + int(length) if length.isdecimal() and is_plain else None
@@ -183,14 +204,18 @@ def _attempt(
             raise TransferError(f"{total} bytes are offered, at most {limit} can be right")
         with part.open("ab" if offset else "wb") as file:
             listen(offset, total)
-            for chunk in response.iter_content(CHUNK):
+            since, then = time.monotonic(), offset
+            # not `iter_content`: it waits for a whole chunk, however slowly that comes
+            while chunk := response.raw.read1(CHUNK, decode_content=True):
                 offset += len(chunk)
                 if offset > limit:
                     raise TransferError(f"more than {limit} bytes came")
                 file.write(chunk)
                 listen(offset, total)
-        if total is not None and offset != total:
-            raise _TryAgain(f"it broke off after {offset} of {total} bytes")
+                if offset - then >= LEAST:
+                    since, then = time.monotonic(), offset
+                elif time.monotonic() - since > patience.timeout:
+                    raise RequestException("the connection stalled")
 
 
 def _status(response: "Response") -> str:
@@ -204,8 +229,11 @@ def _size(path: Path) -> int:
 def _reason(error: Exception) -> str:
     """What went wrong with a connection, in words."""
     from requests import exceptions
+    from urllib3.exceptions import ProtocolError
 
     said = str(error)
+    if type(error) is exceptions.RequestException:  # our own words
+        return said
     if isinstance(error, exceptions.Timeout) or "timed out" in said:
         return "the connection stalled"
     if isinstance(error, exceptions.SSLError):
@@ -214,7 +242,7 @@ def _reason(error: Exception) -> str:
         return "the server's name is not known: is there a network?"
     if "refused" in said.lower():
         return "the server refuses connections"
-    if isinstance(error, exceptions.ChunkedEncodingError):
+    if isinstance(error, ProtocolError):
         return "it broke off"
     if isinstance(error, exceptions.ConnectionError):
         return "there is no connection to the server"

@@ -1,8 +1,9 @@
-"""Wanted members of a zip archive from elsewhere: by their names, never to where the archive says.
+"""Unpacking wanted files from a zip archive that is not trusted.
 
-What an archive claims of sizes is not believed: no more is unpacked than was asked for, and the
-names on disk are the caller's own. Links, folders, encrypted members, and members with absolute
-paths or ``..`` in them are passed over.
+The caller chooses members by their file names, and says where each one goes; the paths in the archive
+are not used. The sizes that an archive states are not believed either: no more is unpacked than a given
+number of bytes. Links, folders, encrypted members, and members with absolute paths or ``..`` in them
+are passed over.
 """
 
 import stat
@@ -15,7 +16,7 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile, ZipInfo
 
 CHUNK = 1 << 16
 RATIO = 200
-"""Most bytes out of one byte in, above a mebibyte: pictures stay far below."""
+"""A member may unpack to so many times its packed size, or to a mebibyte: pictures stay far below."""
 _FREE = 1 << 20
 _ENCRYPTED = 0x1
 _DAMAGED = (BadZipFile, zlib.error, struct.error, EOFError, OSError, OverflowError, RuntimeError, ValueError)
@@ -45,8 +46,8 @@ def opened(path: Path) -> Iterator[ZipFile]:
 def members(archive: ZipFile, names: Sequence[str]) -> list[ZipInfo]:
     """The safe members with one of these file names, whatever folder they lie in.
 
-    There may be several of a name; the caller judges them by their content. Those in fewer folders
-    come first, then in the order of `names`.
+    Several members may have the same file name; the caller tells them apart by their content. Members in
+    fewer folders come first; among these, the order is that of `names`.
     """
     found = [info for info in archive.infolist() if _path(info).name in names and _is_safe(info)]
     return sorted(found, key=lambda info: (len(_path(info).parts), names.index(_path(info).name)))

@@ -16,6 +16,7 @@ from typing import Any, Literal
 from attrs import frozen
 
 from matbench.errors import UserError, failure, unknown
+from matbench.files.own_folders import cache_folder
 
 Group = Literal["algorithms", "datasets", "metrics"]
 
@@ -210,8 +211,7 @@ def kernel_cache() -> Path:
     digest = sha256(_versions().encode())
     for file in _package_files("matbench.algorithms"):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "matbench" / "kernels" / digest.hexdigest()[:16]
+    return cache_folder() / "kernels" / digest.hexdigest()[:16]
 
 
 def _package_files(module: str) -> list[Path]:

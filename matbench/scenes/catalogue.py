@@ -4,6 +4,7 @@ import os
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from fnmatch import fnmatchcase
 from glob import glob
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 from attrs import evolve, frozen
 
 from matbench.errors import UserError, failure, unknown
+from matbench.files.own_folders import data_folder
 from matbench.plans import plugins
 from matbench.scene import Scene
 from matbench.scenes import views_only
@@ -25,19 +27,12 @@ GROUPS = {"paper": PAPER_SCENES}
 _NO_TRUTH = "no ground truth"
 
 
-def user_root() -> Path:
-    """This person's own folder of real scenes, where `matbench fetch` puts them; it may not exist yet."""
-    import platformdirs
-
-    return platformdirs.user_data_path("matbench", appauthor=False)
-
-
 OWN = "folder"
 """The dataset that loads a scene from the folder of a path; every name that is a path is its."""
 
 
 def data_root(data: str | Path | None = None) -> Path | None:
-    """The folder of real scenes: `data`, else what MATBENCH_DATA names, else `user_root` if it exists.
+    """The folder of real scenes: `data`, else what MATBENCH_DATA names, else the person's own if it exists.
 
     Raises
     ------
@@ -46,8 +41,10 @@ def data_root(data: str | Path | None = None) -> Path | None:
     """
     named = data or os.environ.get(DATA_VARIABLE) or None
     if named is None:
-        own = user_root()
-        return own.resolve() if own.is_dir() else None
+        with suppress(UserError):  # without a home folder there are no scenes in it
+            own = data_folder()
+            return own.resolve() if own.is_dir() else None
+        return None
     root = Path(named).expanduser()
     if not root.is_dir():
         by = "--data" if data else DATA_VARIABLE

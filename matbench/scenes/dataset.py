@@ -21,13 +21,13 @@ class Listing:
     views
         How many views it has.
     sizes
-        Option value -> (width, height) in pixels; the default size first.
+        Value of the option ``size`` -> (width, height) in pixels; the default size comes first.
     present
         Can it be loaded now, in its default size?
     complete
         The sizes in which it can be loaded now, where a dataset tells them apart.
     truth
-        Is there ground truth, so that it can be scored?
+        Does it have ground truth, so that methods can be scored on it?
     """
 
     name: str
@@ -51,9 +51,10 @@ class Remote:
     also
         Other names under which the same content may lie, such as ``im0.png`` for ``im0.ppm``.
     offered_as
-        Further names under which it may be offered; it is then renamed, its suffix kept.
+        Further names that a site may use for it. It is then renamed to `name`, with the site's suffix.
     holds
-        Does a file of other bytes hold the same content, such as the same pixels?
+        Asked of a file whose digest differs: does it hold the same content all the same, such as the same
+        pixels in another format?
     """
 
     name: str
@@ -70,7 +71,7 @@ class Remote:
 
 @frozen
 class Download:
-    """Where the files of one scene in one size can be had, and where they go.
+    """Where the files of one scene in one size can be downloaded, and where they go.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ class Download:
 
     @property
     def command(self) -> str:
-        """What brings it, as it is typed."""
+        """The command that downloads it, as a user types it."""
         return shlex.join(["matbench", "fetch", self.name])
 
 

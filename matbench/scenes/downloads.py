@@ -6,28 +6,31 @@ from contextlib import suppress
 from pathlib import Path
 
 from matbench.errors import UserError, unknown
+from matbench.files.own_folders import data_folder
 from matbench.plans import plugins
-from matbench.scenes.catalogue import DATA_VARIABLE, group, is_pattern, user_root
+from matbench.scenes.catalogue import DATA_VARIABLE, group, is_pattern
 from matbench.scenes.dataset import Download
 from matbench.spec import expand
 
 
 def fetch_root(data: str | Path | None = None) -> Path:
-    """Where scenes are put: `data`, else what MATBENCH_DATA names, else the person's own folder.
+    """Where downloaded scenes go: `data`, else what MATBENCH_DATA names, else the person's own folder.
+
+    Unlike `matbench.scenes.catalogue.data_root`, it need not exist yet.
 
     Raises
     ------
     UserError
-        If it is there but no folder.
+        If it is there but no folder, or the person has no folder of their own.
     """
-    root = Path(data or os.environ.get(DATA_VARIABLE) or user_root()).expanduser()
+    root = Path(data or os.environ.get(DATA_VARIABLE) or data_folder()).expanduser()
     if root.exists() and not root.is_dir():
         raise UserError(f"data folder {str(root)!r} is a file: name a folder, or one to be made")
     return root.resolve()
 
 
 def offered() -> dict[str, Mapping[str, Download]]:
-    """Every scene that can be fetched: name -> size, the default first -> its files."""
+    """Every scene that can be fetched: scene's full name -> size -> its files. The default size comes first."""
     found: dict[str, Mapping[str, Download]] = {}
     for prefix, plugin in plugins.installed("datasets").items():
         with suppress(UserError):  # one that cannot be imported is shown by `matbench list`
@@ -38,7 +41,12 @@ def offered() -> dict[str, Mapping[str, Download]]:
 
 
 def downloads(selectors: str | Iterable[str]) -> tuple[list[Download], list[str]]:
-    """The scenes that selectors mean, present or not; and which others patterns mean, and why those cannot be had.
+    """The scenes that selectors mean, whether they are already there or not.
+
+    Returns
+    -------
+    The files of each scene; and a line for each scene that a pattern also matches but that cannot be
+    fetched, with the reason.
 
     Raises
     ------

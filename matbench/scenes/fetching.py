@@ -1,7 +1,7 @@
-"""Bringing scenes from the sites that publish them: every file checked, and put in its place whole.
+"""Downloading scenes from the sites that publish them. A file is put in its place whole, after a check.
 
-While a scene is fetched, its folder holds a folder ``.fetch`` with what has come so far. Two
-fetches of one scene wait for each other, by a lock below the data root.
+While a scene is fetched, its folder holds a folder ``.fetch`` with what has come so far. If two
+processes fetch the same scene, the second waits for the first, by a lock in ``.fetch`` in the data root.
 """
 
 import errno
@@ -24,12 +24,12 @@ from matbench.scenes.dataset import Download, Remote
 
 Event = Literal["scene", "waiting", "bytes"]
 Listener = Callable[[Event, str, int, int | None], None]
-"""Told the event, the scene or URL, and for bytes: how many so far, and in all if known."""
+"""Called with the event, then the scene (or the URL, for "bytes"), then the bytes so far and in all, if known."""
 
 _MISMATCH = "is not the published picture"
 
 SILENT = 2
-"""Files in a row that bring no answer before a site is given up."""
+"""After so many files in a row without an answer, a site is given up."""
 
 
 @frozen
@@ -39,13 +39,13 @@ class Result:
     Parameters
     ----------
     came, there
-        Names of the files that were brought, and of those that were there already.
+        Names of the files that were downloaded now, and of those that were there already.
     missing
         Names of the files that are still not there.
     reasons
-        Why, in lines.
+        Why they are missing, one line each.
     bytes
-        How much came over the network, parts that came earlier included.
+        How much was downloaded; parts that an earlier, interrupted fetch left are counted, too.
     """
 
     download: Download
@@ -88,7 +88,7 @@ def fetch(
     patience: Patience = PATIENCE,
     listen: Listener = lambda *_: None,
 ) -> Iterator[Result]:
-    """Bring scenes, one after the other, and tell what became of each.
+    """Download scenes, one after the other, and yield what became of each.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def fetch(
 
 
 def look(downloads: Sequence[Download], root: Path) -> Iterator[Result]:
-    """As `fetch`, but only see what is there."""
+    """As `fetch`, but only look which files are there; nothing is downloaded or written."""
     for one in downloads:
         job = _Job(one, root, one.site, _Line(PATIENCE, lambda *_: None))
         job.look()

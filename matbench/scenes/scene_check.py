@@ -30,8 +30,8 @@ _TRIAL_PIXELS = 200_000  # rivals of the truth are tried on every k-th row
 
 
 @frozen
-class Finding:
-    """One thing that was looked at.
+class Observation:
+    """One thing that was looked at in a scene. (What a check of a method finds is another class.)
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Finding:
     text: str
 
 
-def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Finding]:
+def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Observation]:
     """Look at a scene's order of views, direction of shift, rows and truth, one after the other.
 
     Parameters
@@ -70,12 +70,12 @@ def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Finding]
     yield from _same(scene, called)
     yield from _borders(scene, called)
     if not scene.truth:
-        yield Finding("truth", "note", f"there is none: a comparison needs {instead_of_truth(scene)}")
+        yield Observation("truth", "note", f"there is none: a comparison needs {instead_of_truth(scene)}")
     for view in sorted(scene.truth):
         yield from _truth(evolve(scene, ref=view, regions={}), called[view])
 
 
-def conclusion(findings: Iterable[Finding]) -> tuple[str, bool]:
+def conclusion(findings: Iterable[Observation]) -> tuple[str, bool]:
     """What all findings say together, in a line, and whether they show that a scene is what it says.
 
     What could not be measured is not good. Only truth that explains the images makes up for it: it shows
@@ -110,110 +110,112 @@ def _inside(scene: Scene, disparities: NDArray[np.float64]) -> float:
     return float(np.mean(held)) if len(held) else 0.0
 
 
-def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | None) -> Finding:
+def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | None) -> Observation:
     if scene.n == 2 and places is None:
-        return Finding("order", "unknown", "two views, and too few features are found again in the other one")
+        return Observation("order", "unknown", "two views, and too few features are found again in the other one")
     if scene.n == 2:
-        return Finding("order", "good", "two views: their order is what the direction of the shift shows")
+        return Observation("order", "good", "two views: their order is what the direction of the shift shows")
     if places is None or np.isfinite(places).sum() < 3:
-        return Finding("order", "unknown", "too few features are found again in other views to tell their order")
+        return Observation("order", "unknown", "too few features are found again in other views to tell their order")
     known = [view for view in range(scene.n) if np.isfinite(places[view])]
     if not _follow(places):
         order = sorted(known, key=lambda view: places[view])
-        return Finding(
+        return Observation(
             "order", "problem", f"the views do not follow one another: list {_list([names[v] for v in order])}"
         )
     away = np.abs(places - (np.arange(scene.n) - scene.ref))
     worst = int(np.nanargmax(away))
     text = f"view {names[worst]} was taken {places[worst] - places[scene.ref]:.2f} steps from {names[scene.ref]}"
     if away[worst] > WRONG_STEP:
-        return Finding("order", "problem", f"views are not evenly spaced: {text}, not {worst - scene.ref}")
+        return Observation("order", "problem", f"views are not evenly spaced: {text}, not {worst - scene.ref}")
     if away[worst] > NOTED_STEP:
-        return Finding("order", "note", f"views are not quite evenly spaced: {text}, not {worst - scene.ref}")
+        return Observation("order", "note", f"views are not quite evenly spaced: {text}, not {worst - scene.ref}")
     even = f"from one side to the other, within {away[worst]:.2f} of a step"
     if len(known) < scene.n:
         left = _list([names[view] for view in range(scene.n) if view not in known])
-        return Finding("order", "unknown", f"too few features are found again in {left}; the others lie {even}")
-    return Finding("order", "good", even)
+        return Observation("order", "unknown", f"too few features are found again in {left}; the others lie {even}")
+    return Observation("order", "good", even)
 
 
-def _direction(scene: Scene, found: NDArray[np.float64]) -> Finding:
+def _direction(scene: Scene, found: NDArray[np.float64]) -> Observation:
     if len(found) < alignment.ENOUGH:
-        return Finding("shift", "unknown", "too few features are found again in other views to tell their disparities")
+        return Observation(
+            "shift", "unknown", "too few features are found again in other views to tell their disparities"
+        )
     inside, mirrored = _inside(scene, found), _inside(scene, -found)
     low, high = np.quantile(found, (0.02, 0.98))
     measured = f"features have {low:.1f} .. {high:.1f} px per view step"
     if inside >= IN_RANGE:
         unsure = "; the range holds either direction, so that only truth can tell it" if mirrored >= IN_RANGE else ""
-        return Finding("shift", "good", f"{measured}, the range is {scene.disparities}{unsure}")
+        return Observation("shift", "good", f"{measured}, the range is {scene.disparities}{unsure}")
     if mirrored >= max(IN_RANGE, inside + _CLEAR_SHARE):
-        return Finding(
+        return Observation(
             "shift",
             "problem",
             f"points move the wrong way: {measured}, the range is {scene.disparities}. Views must be listed from left "
             "to right, so that nearer points move left from one view to the next: list them the other way round",
         )
     share = f"{100 * (1 - inside):.0f} %"
-    return Finding("shift", "problem", f"{share} of them lie outside the range {scene.disparities}: {measured}")
+    return Observation("shift", "problem", f"{share} of them lie outside the range {scene.disparities}: {measured}")
 
 
-def _rows(matches: Mapping[int, Matches], names: Sequence[str]) -> Finding:
+def _rows(matches: Mapping[int, Matches], names: Sequence[str]) -> Observation:
     found = {view: rows for view, moved in matches.items() if (rows := alignment.rows(moved)) is not None}
     if not found:
-        return Finding("rows", "unknown", "too few features are found again in other views to tell their rows")
+        return Observation("rows", "unknown", "too few features are found again in other views to tell their rows")
     worst = max(found, key=lambda view: found[view].worst)
     rows = found[worst]
     if rows.worst <= NOTED_ROWS:
-        return Finding("rows", "good", f"level within {rows.worst:.2f} px")
+        return Observation("rows", "good", f"level within {rows.worst:.2f} px")
     side = "lower" if rows.offset > 0 else "higher"
     text = f"view {names[worst]} lies {abs(rows.offset):.2f} px {side} than the reference view"
     turned = ", and is turned or scaled" if rows.worst > 2 * abs(rows.offset) + NOTED_ROWS else ""
     text += f"{turned}: up to {rows.worst:.2f} px between rows"
     wrong = rows.worst > WRONG_ROWS
-    return Finding("rows", "problem" if wrong else "note", text + ("; rectify the views first" if wrong else ""))
+    return Observation("rows", "problem" if wrong else "note", text + ("; rectify the views first" if wrong else ""))
 
 
-def _same(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
+def _same(scene: Scene, names: Sequence[str]) -> Iterator[Observation]:
     alike: dict[bytes, list[str]] = {}
     for name, view in zip(names, scene.views, strict=True):
         alike.setdefault(sha256(view.tobytes()).digest(), []).append(name)
     for same in alike.values():
         if len(same) > 1:
-            yield Finding("views", "problem", f"{_list(same)} are one and the same picture")
+            yield Observation("views", "problem", f"{_list(same)} are one and the same picture")
 
 
-def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Finding]:
+def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Observation]:
     lost = {}
     for name, view in zip(names, scene.views, strict=True):
         first, last = picture_columns(view)
         lost[name] = scene.width - 1 - last + first
     black = ", ".join(f"{name} ({count})" for name, count in lost.items() if count)
     if black:
-        yield Finding("borders", "note", f"views end in black columns, which match nothing: {black}")
+        yield Observation("borders", "note", f"views end in black columns, which match nothing: {black}")
 
 
-def _truth(scene: Scene, name: str) -> Iterator[Finding]:
+def _truth(scene: Scene, name: str) -> Iterator[Observation]:
     topic = f"{_TRUTH_OF}{name}"
     known = np.count_nonzero(np.isfinite(scene.truth[scene.ref]))
     if beyond := beyond_range(scene):
         share = np.count_nonzero(scene.out_of_range) / known
-        yield Finding(topic, "problem" if share > LARGEST_BEYOND else "note", beyond)
+        yield Observation(topic, "problem" if share > LARGEST_BEYOND else "note", beyond)
     error = together(warping_errors(scene))
     if error is None or error.pixels < LEAST_SEEN * (scene.n - 1) * known:
-        yield Finding(topic, "problem", "it leads out of the other views nearly everywhere: is its scale right?")
+        yield Observation(topic, "problem", "it leads out of the other views nearly everywhere: is its scale right?")
         return
     at = error.mean
     said = f"warped views differ by {at[1]:.2f} grey levels, {at[0]:.2f} and {at[2]:.2f} with it 1 px of the pair off"
     rival = _better(scene)
     if rival is not None:
-        yield Finding(topic, "problem", f"{said}. The views are explained better {rival}")
+        yield Observation(topic, "problem", f"{said}. The views are explained better {rival}")
     elif at[1] >= min(at[0], at[2]):
         way = "smaller" if at[0] < at[2] else "larger"
-        yield Finding(topic, "problem", f"{said}: {way} disparities explain the views better")
+        yield Observation(topic, "problem", f"{said}: {way} disparities explain the views better")
     else:
         best = _vertex(error)
         text = f"; {best:+.1f} px would explain them best" if abs(best) > NOTED_SHIFT else ""
-        yield Finding(topic, "note" if text else "good", said + text)
+        yield Observation(topic, "note" if text else "good", said + text)
 
 
 def beyond_range(scene: Scene) -> str | None:

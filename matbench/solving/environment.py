@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import ModuleType
 
+from matbench.errors import UserError
 from matbench.plans import plugins
 
 
@@ -33,7 +34,7 @@ def kernel_cache_in_use() -> Iterator[None]:
     state of the code keeps it from loading a kernel that was compiled from other code.
     """
     before = os.environ.get("NUMBA_CACHE_DIR")
-    with suppress(OSError):  # where no folder can be made, each process compiles its kernels itself
+    with suppress(OSError, UserError):  # where no folder can be made, each process compiles its kernels itself
         place = plugins.kernel_cache()
         place.mkdir(parents=True, exist_ok=True)
         os.environ["NUMBA_CACHE_DIR"] = str(place)

@@ -6,10 +6,12 @@ import socket
 import subprocess
 import sys
 import time
+from email.utils import formatdate
 from pathlib import Path
 
 import pytest
 
+from matbench.files import transfer
 from matbench.files.transfer import NoAnswer, Patience, TransferError, download
 
 BODY = os.urandom(200_000)
@@ -110,6 +112,19 @@ def test_a_connection_that_stalls_for_ever_ends_in_words(site, target: Path) -> 
     assert len(site.requests) == 1 + QUICK.retries
 
 
+def test_a_trickle_is_given_up_as_if_nothing_came(site, target: Path) -> None:
+    site.faults["a.zip"] = [("slow", 0, 0.05, 1)]
+    site.forever.add("a.zip")
+    start = time.monotonic()
+    with pytest.raises(NoAnswer, match="stalled"):
+        fetch(site, target, SHORT)
+    assert time.monotonic() - start < 20
+    assert len(site.requests) == 1 + SHORT.retries
+    part = target.with_name("a.zip.part").read_bytes()
+    assert part == BODY[: len(part)]
+    assert 0 < len(part) < transfer.LEAST
+
+
 @pytest.mark.parametrize("status", [404, 403, 410])
 def test_what_a_server_refuses_is_not_asked_for_again(site, target: Path, status: int) -> None:
     site.faults["a.zip"] = [status]
@@ -126,6 +141,35 @@ def test_a_busy_server_is_asked_again_later(site, target: Path) -> None:
     fetch(site, target)
     assert target.read_bytes() == BODY
     assert len(site.requests) == 4
+
+
+def test_a_server_gets_the_pause_that_it_asks_for(site, target: Path) -> None:
+    site.faults["a.zip"] = [("busy", "1")]
+    start = time.monotonic()
+    fetch(site, target)
+    assert 1 <= time.monotonic() - start < 10
+
+
+def test_the_pause_may_be_asked_for_by_a_date(site, target: Path) -> None:
+    site.faults["a.zip"] = [("busy", formatdate(time.time() + 3, usegmt=True))]
+    start = time.monotonic()
+    fetch(site, target)
+    assert 1.5 <= time.monotonic() - start < 10  # dates have whole seconds
+
+
+def test_no_pause_is_longer_than_the_longest(site, target: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(transfer, "LONGEST_PAUSE", 0.1)
+    site.faults["a.zip"] = [("busy", "3600")]
+    start = time.monotonic()
+    fetch(site, target)
+    assert time.monotonic() - start < 10
+
+
+@pytest.mark.parametrize("asked", ["soon", "-1", ""])
+def test_a_pause_that_is_none_is_passed_over(site, target: Path, asked: str) -> None:
+    site.faults["a.zip"] = [("busy", asked)]
+    fetch(site, target)
+    assert target.read_bytes() == BODY
 
 
 def test_pauses_grow(site, target: Path) -> None:

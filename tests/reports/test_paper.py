@@ -163,7 +163,7 @@ def run(report: Report, tmp_path: Path) -> Path:
 
 
 def test_tables_read_back_give_the_same_sheet(report: Report, run: Path) -> None:
-    pd.testing.assert_frame_equal(paper.sheet(*paper.read(run)).texts, made(report).texts)
+    pd.testing.assert_frame_equal(paper.sheet(*paper.read_run(run)).texts, made(report).texts)
 
 
 def matbench(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
@@ -211,4 +211,4 @@ def test_a_folder_that_is_no_finished_run(run: Path, capsys: pytest.CaptureFixtu
     assert "is damaged" in matbench(capsys, "report", str(run))[2]
     (run / "results.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UserError, match="is damaged"):
-        paper.read(run)
+        paper.read_run(run)

@@ -10,8 +10,9 @@ import pytest
 
 from matbench import comparison
 from matbench.errors import UserError
+from matbench.files.own_folders import data_folder
 from matbench.plans.settings import Settings
-from matbench.scenes.catalogue import DATA_VARIABLE, data_root, load_scene, select, user_root
+from matbench.scenes.catalogue import DATA_VARIABLE, data_root, load_scene, select
 
 
 def write(folder: Path, *names: str) -> None:
@@ -112,8 +113,8 @@ def test_without_a_name_the_persons_own_folder_is_the_data_root(
     monkeypatch.delenv(DATA_VARIABLE, raising=False)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "own"))
     assert data_root() is None, "it is not there yet"
-    user_root().mkdir(parents=True)
-    assert data_root() == user_root().resolve()
+    data_folder().mkdir(parents=True)
+    assert data_root() == data_folder().resolve()
     assert data_root(root) == root.resolve()
     monkeypatch.setenv(DATA_VARIABLE, str(root))
     assert data_root() == root.resolve()

@@ -10,7 +10,7 @@ from attrs import evolve
 from matbench import load_scene
 from matbench.scene import Range, Scene
 from matbench.scenes.alignment import match, places, rows
-from matbench.scenes.scene_check import Finding, Verdict, check, conclusion
+from matbench.scenes.scene_check import Observation, Verdict, check, conclusion
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def scene() -> Scene:
     return load_scene("synthetic/box[n=6 size=320x240]")
 
 
-def _found(scene: Scene) -> dict[str, Finding]:
+def _found(scene: Scene) -> dict[str, Observation]:
     return {finding.topic: finding for finding in check(scene)}
 
 
@@ -103,7 +103,7 @@ def test_one_picture_twice_is_told(n: int) -> None:
     scene = load_scene(f"synthetic/box[n={n}]")
     same = evolve(scene, views=scene.views[[0, 0, *range(2, n)]], truth={}, visible={}, regions={})
     problem = next(finding for finding in check(same) if finding.topic == "views")
-    assert problem == Finding("views", "problem", "0, 1 are one and the same picture")
+    assert problem == Observation("views", "problem", "0, 1 are one and the same picture")
 
 
 @pytest.mark.parametrize("n", [2, 3])
@@ -131,7 +131,7 @@ def test_nothing_is_known_of_blank_pictures(n: int) -> None:
     ],
 )
 def test_unknown_is_not_summed_up_as_good(verdicts: dict[str, Verdict], said: str, is_shown: bool) -> None:
-    told, shown = conclusion([Finding(topic, verdict, "") for topic, verdict in verdicts.items()])
+    told, shown = conclusion([Observation(topic, verdict, "") for topic, verdict in verdicts.items()])
     assert told.startswith(said)
     assert shown is is_shown
 

@@ -1,0 +1,78 @@
+"""Where a person's scenes and compiled kernels lie, and what is said where there is no such place."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from matbench.errors import UserError
+from matbench.files.own_folders import cache_folder, data_folder
+from matbench.plans.plugins import kernel_cache
+from matbench.scenes.catalogue import data_root
+from matbench.solving.environment import kernels_kept
+
+FOLDERS = [(data_folder, "XDG_DATA_HOME", ".local/share"), (cache_folder, "XDG_CACHE_HOME", ".cache")]
+
+
+@pytest.fixture
+def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A person without HOME, of whom the system's list of users knows nothing."""
+    for name in ("HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "MATBENCH_DATA", "NUMBA_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    pwd = pytest.importorskip("pwd", reason="homes are named otherwise here")
+
+    def unknown(_: object) -> None:
+        raise KeyError
+
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have other folders")
+@pytest.mark.parametrize(("folder", "variable", "usual"), FOLDERS)
+def test_below_home_or_where_the_variable_says(folder, variable, usual, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv(variable, raising=False)
+    assert folder() == tmp_path / usual / "matbench"
+    monkeypatch.setenv(variable, str(tmp_path / "elsewhere"))
+    assert folder() == tmp_path / "elsewhere" / "matbench"
+
+
+@pytest.mark.parametrize(("folder", "variable"), [one[:2] for one in FOLDERS])
+def test_without_a_home_it_is_said_what_to_set(homeless, folder, variable, tmp_path: Path, monkeypatch) -> None:
+    with pytest.raises(UserError, match=f"no home folder for .*: set HOME, or {variable}"):
+        folder()
+    monkeypatch.setenv(variable, str(tmp_path))
+    assert folder() == tmp_path / "matbench"
+
+
+def test_kernels_lie_below_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert kernel_cache().parent == tmp_path / "matbench" / "kernels"
+
+
+def test_without_a_home_kernels_are_not_kept_and_there_are_no_scenes(homeless, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with kernels_kept():
+        assert data_root() is None
+    assert list(tmp_path.iterdir()) == [], "no folder called ~"
+
+
+HOMELESS = """
+import pwd, sys
+def unknown(_):
+    raise KeyError
+pwd.getpwuid = unknown
+from matbench.cli import main
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize("line", [["fetch", "middlebury2003/teddy", "--dry-run"], ["bench", "--scaling"]])
+def test_commands_say_it_in_one_line(line: list[str], tmp_path: Path) -> None:
+    command = [sys.executable, "-c", HOMELESS, *line]
+    done = subprocess.run(command, env={"PATH": "/usr/bin:/bin"}, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "no home folder" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
