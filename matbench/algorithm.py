@@ -91,8 +91,9 @@ class Algorithm(Protocol):
         Why this scene cannot be solved; its cell is then skipped, not failed.
     ``presets: ClassVar[Mapping[str, Mapping[str, object]]]``
         Named sets of parameters, chosen as ``name[preset=paper]``.
-    ``code_files: Sequence[Path]``
-        Files besides its own code whose content decides its answers, such as a program or weights.
+    ``reads: Sequence[Path]``
+        Files besides its own code whose content decides its answers, such as a program or weights; folders, too.
+        A parameter that is a path needs not be among them. (Its old name is ``code_files``.)
     """
 
     def solve(self, scene: Scene, context: Context) -> Estimate:

@@ -182,54 +182,52 @@ class _Reader:
                 self.parts.update(owners)
                 return
         found = self._find(name)
-        if found is None:
-            if not what.is_attribute:  # an attribute may be anything
-                self.parts.setdefault(name, NOT_THERE)
-            return
-        for parent in _parents(name):
-            self._enter(parent)
-        self._take(found, what.name)
+        if found is not None:
+            for parent in _parents(name):
+                self._enter(parent)
+            self._take(found, what)
+        elif not what.is_attribute:  # an attribute may be anything
+            self.parts.setdefault(name, NOT_THERE)
 
     def _enter(self, name: str) -> None:
         """Count a package that something else is imported from: its own code runs as well.
 
-        The harness's are known to do nothing but give names, each of which is followed alone.
+        Those of the harness are known to do nothing but give names, each of which is followed alone.
         """
         found = self._find(name)
-        if found is not None and name.partition(".")[0] != HARNESS:
+        if found is not None and not _is_harness(found):
             self.count(found)
 
-    def _take(self, module: _Found, name: str) -> None:
-        """Count what ``from module import name`` takes, or ``import module`` if there is no name."""
-        is_harness = module.name.partition(".")[0] == HARNESS
-        if module.inside is None or not is_harness:
+    def _take(self, module: _Found, what: Import) -> None:
+        """Count what is taken from a module that was found, or all of it."""
+        if module.inside is None or not _is_harness(module):
             self.count(module)
-        if module.inside is None or not name:
+        if module.inside is None or not what.name:
             return
-        source = self._source_of(module, name)
-        if source is not None:
-            self.follow(module.name, _absolute(source, module))
-        elif (sub := self._find(f"{module.name}.{name}")) is not None:
-            self._take(sub, "")
-        elif is_harness:  # it is written there, or everything is taken
+        names = self._names(module)
+        if what.name == "*":
+            for one in names.values():
+                self.follow(module.name, _absolute(one, module))
+        if what.name in names:
+            self.follow(module.name, _absolute(names[what.name], module))
+        elif (sub := self._find(f"{module.name}.{what.name}")) is not None:
+            self._take(sub, Import(0, sub.name))
+        elif not what.is_attribute:  # it is written there
             self.count(module)
 
-    def _source_of(self, package: _Found, name: str) -> Import | None:
-        """Where a package takes one of its names from."""
-        if package.file is None or not package.file.endswith(tuple(SOURCE_SUFFIXES)):
-            return None
-        with suppress(OSError):
-            return facts(Path(package.file).read_bytes(), is_package=True).names.get(name)
-        return None
+    def _names(self, package: _Found) -> Mapping[str, Import]:
+        """The names that a package takes from elsewhere, and where from."""
+        if package.file is not None and package.file.endswith(tuple(SOURCE_SUFFIXES)):
+            with suppress(OSError):
+                return facts(Path(package.file).read_bytes(), is_package=True).names
+        return {}
 
     def _meant(self, importer: str, name: str) -> str:
         """The name under which an absolute import is found: beside the plug-in, if it is said there."""
-        is_beside = importer.startswith(".") and not name.startswith(".")
         top = name.partition(".")[0]
-        # a file that imports its own name means another
-        if is_beside and self.folder is not None and importer != f".{top}" and lies_beside(self.folder, top):
-            return f".{name}"
-        return name
+        if self.folder is None or not top or not importer.startswith(".") or importer == f".{top}":
+            return name  # a file that imports its own name means another
+        return f".{name}" if lies_beside(self.folder, top) else name
 
     def _find(self, name: str) -> _Found | None:
         if name not in self._places:
@@ -247,6 +245,10 @@ class _Reader:
             return None
         found = _in_folders(last, package.inside)
         return _Found(name, found.file, found.inside) if found else _by_finders(name, package.inside)
+
+
+def _is_harness(module: _Found) -> bool:
+    return module.name.partition(".")[0] == HARNESS
 
 
 def _parents(name: str) -> Iterator[str]:
@@ -339,7 +341,9 @@ def _holding(top: str, root: str) -> list[Path]:
 
 @cache
 def _metadata(root: str) -> tuple[Path, ...]:
-    kinds = (".dist-info", ".egg-info") if Path(root).name in _INSTALLED else (".dist-info",)  # a source tree has the latter
+    kinds = (
+        (".dist-info", ".egg-info") if Path(root).name in _INSTALLED else (".dist-info",)
+    )  # a source tree has the latter
     with suppress(OSError):
         return tuple(Path(root, name) for name in sorted(os.listdir(root)) if name.endswith(kinds))  # noqa: PTH208
     return ()

@@ -72,7 +72,7 @@ def facts(source: bytes, is_package: bool) -> Facts:
         _write(tree, words, telling)
         whole = sha256("\0".join(words).encode("utf-8", "surrogatepass")).hexdigest()
         return Facts(whole, tuple(dict.fromkeys(_imports(telling))), names)
-    except (SyntaxError, ValueError, RecursionError):  # whoever imports it is told so
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # whoever imports it is told so
         return Facts(sha256(source).hexdigest())
 
 

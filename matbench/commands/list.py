@@ -3,6 +3,7 @@
 import inspect
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -84,7 +85,16 @@ def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
             name: {"type": spec.describe(kind), "default": None if default is empty else _plain(default)}
             for name, (kind, default) in parameters.items()
         },
+        "reads": _reads(plugin.name, cls),
     }
+
+
+def _reads(name: str, cls: type) -> list[str]:
+    """The files that a method with its defaults says it reads; none where something must be given, or is wrong."""
+    if hasattr(cls, "reads") or hasattr(cls, "code_files"):  # else it need not be made
+        with suppress(UserError):
+            return [str(path) for path in plugins.declared(name, spec.build(name, cls, {}))]
+    return []
 
 
 def _plain(value: Any) -> Any:
@@ -112,6 +122,7 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         lines = [facts["about"]]
         lines += [f"  {key}={_shown(p['default'])}: {p['type']}" for key, p in facts["parameters"].items()]
         lines += [f"  preset={preset}" for preset in facts["presets"]]
+        lines += [f"  reads {file}" for file in facts["reads"]]
         methods.add_row(escape(name), escape("\n".join(lines)))
     scenes = Table(
         Column("scene", no_wrap=True),

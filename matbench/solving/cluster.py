@@ -3,13 +3,14 @@
 Every worker solves its cells as they are solved here: each in a process of its own, watched by a keeper,
 in a folder of the worker's own. What comes back is that folder, as bytes. Scenes are not sent: a worker
 finds them in its own data folder, or in the one that is named here if it can see it, and compares
-digests. Users' own files of methods are sent. Dask itself exchanges tasks as pickles: whoever can reach
+digests. Users' own files of methods are sent, with what they import beside them; files that a method reads are not,
+as they may be large: each worker needs them by the same path. Dask itself exchanges tasks as pickles: whoever can reach
 its scheduler can run programs on the workers.
 """
 
 import atexit
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from multiprocessing import current_process
@@ -22,7 +23,7 @@ from uuid import uuid4
 
 from attrs import define, evolve, frozen
 
-from matbench import spec
+from matbench import code, spec
 from matbench.errors import UserError
 from matbench.files.unzip import ArchiveError
 from matbench.plans import plugins
@@ -49,12 +50,13 @@ class Task:
     run
         Distinguishes what belongs to one run from all else on the cluster.
     files
-        Name and content of the users' own files that hold methods.
+        The users' own files that hold methods: the name of each, and by their paths below its folder the content of
+        all that it imports from there, itself included.
     """
 
     run: str
     cell: Cell
-    files: tuple[tuple[str, bytes], ...]
+    files: tuple[tuple[str, Mapping[str, bytes]], ...]
     settings: Settings
 
 
@@ -92,7 +94,7 @@ def work(
     """
     if settings.dask == "local":
         settings = evolve(settings, threads=settings.threads_each(), memory=settings.memory_each())
-    files = tuple((Path(file).name, Path(file).read_bytes()) for file in plan.plugin_files)
+    files = tuple((Path(file).name, _with_helpers(Path(file))) for file in plan.plugin_files)
     with _client(settings) as client:
         from distributed import as_completed
 
@@ -134,6 +136,11 @@ def work(
             with telling:
                 waiting.clear()
             client.cancel(list(futures.values()), force=True)
+
+
+def _with_helpers(file: Path) -> dict[str, bytes]:
+    """A user's own file and what it imports beside it: path below its folder -> content."""
+    return {name: one.read_bytes() for name, one in code.of_file(file).beside(file.parent).items()}
 
 
 def _others(client: Any, declined: Sequence[Reply]) -> list[str]:
@@ -287,17 +294,16 @@ _keepers = Keepers(SimpleQueue(), Lock())
 atexit.register(_keepers.dismiss)
 
 
-def _written(files: Sequence[tuple[str, bytes]], folder: Path) -> tuple[str, ...]:
+def _written(files: Sequence[tuple[str, Mapping[str, bytes]]], folder: Path) -> tuple[str, ...]:
     """The paths of users' files as they came, each in a folder of its own; their names count in digests."""
-    paths = []
-    for number, (name, content) in enumerate(files):
-        if Path(name).name != name:
-            raise ValueError(f"{name!r} is no file name")
-        path = folder / str(number) / name
-        path.parent.mkdir()
-        path.write_bytes(content)
-        paths.append(str(path))
-    return tuple(paths)
+    for number, (_, contents) in enumerate(files):
+        for name, content in contents.items():
+            path = folder / str(number) / name
+            if not path.resolve().is_relative_to((folder / str(number)).resolve()):
+                raise ValueError(f"{name!r} is no path below a folder")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+    return tuple(str(folder / str(number) / name) for number, (name, _) in enumerate(files))
 
 
 def _data(named: Path | None) -> Path | None:
@@ -321,7 +327,7 @@ def _unlike(cell: Cell, files: Sequence[str], root: Path | None) -> str:
     except (ImportError, OSError, UserError) as error:
         return f"the worker cannot use {name}: {first_line(error)}"
     if not is_same:
-        return f"the worker has other code of {name}, or other versions of numpy, numba or OpenCV: install the same"
+        return f"the worker has other code of {name}, or other versions of what it imports: install the same"
     try:
         if _digest(cell.scene, root) != cell.scene_digest:
             return f"the worker's {cell.scene} is another one: give all workers the same data"

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import define, evolve, field
 
+from matbench.plans import plugins
 from matbench.runs.store import Outcome, Store, write_cell
 from matbench.solving import processes
 from matbench.solving.worker import Job, serve
@@ -189,6 +190,7 @@ def _cell(job: Job, inbox: Connection, child: Child | None) -> Child | None:
             if stays or stays is None:
                 return child if stays else None
             _empty(draft)  # what went before may be to blame: once more, in a fresh process
+        plugins.read_ahead(job.cell.method.algorithm, job.plugin_files)
         child = Child.fork(job, inbox)
         return child if _attempt(job, draft.resolve(), inbox, child) else None
 
