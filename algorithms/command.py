@@ -101,7 +101,7 @@ class Command:
     files: str = ""
 
     @property
-    def code_files(self) -> Sequence[Path]:
+    def reads(self) -> Sequence[Path]:
         """The program and the further files."""
         return [_executable(self.program) or Path(self.program), *(Path(file) for file in shlex.split(self.files))]
 

@@ -96,8 +96,9 @@ class Algorithm(Protocol):
     ``silent: Mapping[str, str]``
         The parameters that nothing reads beside the values of the others -> what they take to be read, such
         as ``{"sharpness": "start=soft"}``. One of them that is typed is refused in one line.
-    ``code_files: Sequence[Path]``
-        Files besides its own code whose content decides its answers, such as a program or weights.
+    ``reads: Sequence[Path]``
+        Files besides its own code whose content decides its answers, such as a program or weights; folders, too.
+        A parameter that is a path needs not be among them. (Its old name is ``code_files``.)
     """
 
     def solve(self, scene: Scene, context: Context) -> Estimate:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache, wraps
 from itertools import product
 from math import isfinite
+from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from attrs import Factory, evolve, field, fields_dict, frozen, has
@@ -143,6 +144,7 @@ def _converter() -> Converter:
     converter.register_structure_hook(bool, _strict(bool, truths))
     converter.register_structure_hook(int, _strict(int))
     converter.register_structure_hook(float, _finite)
+    converter.register_structure_hook(Path, lambda value, _: Path(str(value)).expanduser())
     converter.register_structure_hook_func(_is_literal, _literal)
     converter.register_structure_hook_func(lambda kind: kind is Any, lambda value, _: value)
     return converter
@@ -153,7 +155,9 @@ def describe(kind: Any) -> str:
     if _is_literal(kind):
         *most, last = map(str, get_args(kind))
         return f"{', '.join(most)} or {last}" if most else last
-    return {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}.get(kind, str(kind))
+    return {bool: "true or false", int: "a whole number", float: "a number", str: "a text", Path: "a path"}.get(
+        kind, str(kind)
+    )
 
 
 @frozen
@@ -297,6 +301,10 @@ def required(cls: type) -> list[str]:
 
 def _kind_of(default: object) -> Any:
     """The type of a parameter that has no annotation: that of its default, if it is a simple one."""
+    if isinstance(default, Path):
+        return Path
+    if isinstance(default, Path):
+        return Path
     return type(default) if type(default) in (bool, int, float, str) else Any
 
 
@@ -353,7 +361,7 @@ def values_of(instance: object) -> dict[str, Value]:
     """
     values: dict[str, Value] = {}
     for key, (kind, _) in _arguments(type(instance)).items():
-        value = getattr(instance, key, _MISSING)
+        value = plain(getattr(instance, key, _MISSING))
         if is_group(kind) and isinstance(value, kind):
             values |= values_of(value)
             continue
@@ -361,7 +369,7 @@ def values_of(instance: object) -> dict[str, Value]:
             kept = "it is not kept" if value is _MISSING else f"it is kept as {type(value).__name__}"
             raise UserError(
                 f"{type(instance).__name__}: parameter {key!r} must be kept as self.{key}, "
-                f"a truth value, number or text; {kept}"
+                f"a truth value, number, text or path; {kept}"
             )
         values[key] = value
     return values
@@ -370,13 +378,28 @@ def values_of(instance: object) -> dict[str, Value]:
 _MISSING = object()
 
 
+def plain(value: Any) -> Any:
+    """A parameter's value as it is stored: paths as text."""
+    return str(value) if isinstance(value, Path) else value
+
+
+def paths_of(instance: object) -> dict[str, Path]:
+    """Those parameters of a method's instance that are paths, if they are given."""
+    found, values = {}, values_of(instance)
+    for key, one in parameters(type(instance)).items():
+        value = values.get(key)
+        if isinstance(value, str) and Path in (one.kind, *get_args(one.kind)):
+            found[key] = Path(value)
+    return found
+
+
 def changed(instance: object, preset: str | None = None) -> dict[str, Value]:
     """Only those parameters that differ from their defaults, or the preset's name and what differs from it."""
     cls = type(instance)
     base = {key: one.default for key, one in parameters(cls).items()}
     named: dict[str, Value] = {} if preset is None else {"preset": preset}
     base |= presets_of(cls)[preset] if preset is not None else {}
-    return named | {key: value for key, value in values_of(instance).items() if value != base[key]}
+    return named | {key: value for key, value in values_of(instance).items() if value != plain(base[key])}
 
 
 def expand(selectors: str | Iterable[str]) -> list[Spec]:

@@ -3,6 +3,7 @@
 import inspect
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
@@ -89,7 +90,16 @@ def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
             | ({"group": one.group} if one.group else {})
             for name, one in parameters.items()
         },
+        "reads": _reads(plugin.name, cls),
     }
+
+
+def _reads(name: str, cls: type) -> list[str]:
+    """The files that a method with its defaults says it reads; none where something must be given, or is wrong."""
+    if hasattr(cls, "reads") or hasattr(cls, "code_files"):  # else it need not be made
+        with suppress(UserError):
+            return [str(path) for path in plugins.declared(name, spec.build(name, cls, {}))]
+    return []
 
 
 def _plain(value: Any) -> Any:
@@ -118,6 +128,7 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         for group, members in groupby(facts["parameters"].items(), key=lambda item: item[1].get("group", "")):
             lines += [f" {group.replace('_', ' ')}:"] if group else []
             lines += [f"  {key}={_shown(one['default'])}: {one['type']}" for key, one in members]
+        lines += [f"  reads {file}" for file in facts["reads"]]
         methods.add_row(escape(name), escape("\n".join(lines)))
     scenes = Table(
         Column("scene", no_wrap=True),

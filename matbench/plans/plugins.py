@@ -1,22 +1,23 @@
 """Finding methods, datasets and metrics: through entry points, and in a user's own file."""
 
-import importlib.util
 import inspect
 import os
 import re
-import sys
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import EntryPoint, entry_points, version
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Literal
 
 from attrs import frozen
 
+from matbench import code, spec
+from matbench.code import Code
 from matbench.errors import UserError, failure, unknown
-from matbench.files.own_folders import cache_folder
+from matbench.plans import kernels
+from matbench.plans.own_file import import_file
 
 Group = Literal["algorithms", "datasets", "metrics"]
 
@@ -85,7 +86,7 @@ def from_file(path: Path) -> Mapping[str, Plugin]:
     """
     if not os.path.isfile(path):  # noqa: PTH113 (False where a folder may not be entered, too)
         raise UserError(f"plug-in file {str(path)!r} does not exist or may not be read: give the path of a Python file")
-    module = _import_file(path)
+    module = import_file(path)
     classes = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module.__name__]
     found = {}
     for cls in classes:
@@ -99,29 +100,6 @@ def from_file(path: Path) -> Mapping[str, Plugin]:
     if not found:
         raise UserError(f"plug-in file {str(path)!r} holds no method: a class with solve(self, scene, context)")
     return found
-
-
-def _import_file(path: Path) -> ModuleType:
-    try:
-        content = sha256(path.read_bytes()).hexdigest()[:16]
-    except OSError as error:
-        raise UserError(f"plug-in file {str(path)!r} cannot be read: {error.strerror}") from error
-    name = f"matbench_plugin_{path.stem}_{content}"
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise UserError(f"plug-in file {str(path)!r} is not a Python file: its name must end in .py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # sys.exit included
-        del sys.modules[name]
-        raise UserError(f"plug-in file {str(path)!r}: {failure(error)}") from error
-    return module
 
 
 def algorithms(files: Iterable[Path] = ()) -> dict[str, Plugin]:
@@ -152,43 +130,75 @@ def algorithm(name: str, files: Iterable[Path] = ()) -> Plugin:
     raise unknown("algorithm", name, known)
 
 
+def code_of(plugin: Plugin) -> Code:
+    """All code behind a plug-in as it is now: what its module imports, whatever the module does with it.
+
+    Raises
+    ------
+    UserError
+        If a user's own file cannot be read.
+    """
+    if not isinstance(plugin.entry, type):
+        return code.of_module(plugin.entry.module, plugin.entry.attr)
+    try:
+        return code.of_file(Path(plugin.source))
+    except OSError as error:
+        raise UserError(f"plug-in file {plugin.source!r} cannot be read: {error.strerror}") from error
+
+
+def read_ahead(name: str, files: Iterable[str]) -> None:
+    """Read the code of a method, and run none of it: processes forked from this one have it read already."""
+    with suppress(OSError):  # whoever needs it is told so
+        for file in files:
+            code.of_file(Path(file))
+    if (plugin := installed("algorithms").get(name)) is not None:
+        code_of(plugin)
+
+
 @cache
 def code_digest(plugin: Plugin) -> str:
-    """SHA-256 of the code that decides a method's answers.
+    """SHA-256 of the code behind a plug-in, as it was when it was first asked for."""
+    return code_of(plugin).digest
 
-    For a method in a file, that file; otherwise all modules of the package around it (built in:
-    all of `algorithms/`, and the modules of the harness that methods compute with); and the
-    versions of numpy, numba and OpenCV.
+
+def declared(name: str, instance: object) -> list[Path]:
+    """The files that a method says it `reads`.
+
+    Raises
+    ------
+    UserError
+        If that is no list of paths.
     """
-    digest = sha256(_versions().encode())
-    here = Path(__file__).parents[1]
-    files = [here / "scene.py", here / "space.py", here / "algorithm.py"]
-    if isinstance(plugin.entry, type):
-        files.append(Path(plugin.source))
-    else:
-        files += _package_files(plugin.entry.module)
-    for file in files:
-        digest.update(file.name.encode() + b"\0" + file.read_bytes())
-    return digest.hexdigest()
+    found: list[Path] = []
+    for attribute in ("reads", "code_files"):  # the latter is the old name
+        said = getattr(instance, attribute, ())
+        try:
+            found += [Path(file) for file in said]
+        except TypeError:
+            said = ""
+        if isinstance(said, str):
+            raise UserError(f"{name}: {attribute} is no list of paths")
+    return found
 
 
 def method_digest(plugin: Plugin, instance: object) -> str:
-    """`code_digest`, and that of what the method's `code_files` hold, if it names any.
+    """`code_digest`, and the content of the files that the method reads: parameters that are paths, and `declared`.
 
     Raises
     ------
     UserError
         If one of them cannot be read.
     """
-    files = getattr(instance, "code_files", ())
+    files = {f"{key}={path}": path for key, path in spec.paths_of(instance).items()}
+    files |= {str(path): path for path in declared(plugin.name, instance)}
     if not files:
         return code_digest(plugin)
     digest = sha256(code_digest(plugin).encode())
-    for file in files:
+    for said, file in files.items():
         try:
-            digest.update(sha256(Path(file).read_bytes()).digest())
+            digest.update(bytes.fromhex(code.of_content(file)))
         except OSError as error:
-            raise UserError(f"{plugin.name}: {str(file)!r} cannot be read: {error.strerror}") from error
+            raise UserError(f"{plugin.name}: {said!r} cannot be read: {error.strerror}") from error
     return digest.hexdigest()
 
 
@@ -199,26 +209,12 @@ def unsupported(method: object, scene: object) -> str:
     return str(reason) if reason else ""
 
 
-def _versions() -> str:
-    return " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "opencv-python-headless"))
-
-
 def kernel_cache() -> Path:
-    """Where compiled kernels are kept: a folder for each state of the built-in methods' code.
+    """Where compiled kernels are kept: a folder for each state of the code of the installed methods that have some.
 
-    numba notices a change of a kernel's own file, not of one that it calls in another.
+    numba notices a change of a kernel's own file, by its time and size, but not of one that it calls in another. So
+    it is enough, and needed, that a change of what code does makes another folder; a comment does not.
     """
-    digest = sha256(_versions().encode())
-    for file in _package_files("matbench.algorithms"):
-        digest.update(file.name.encode() + b"\0" + file.read_bytes())
-    return cache_folder() / "kernels" / digest.hexdigest()[:16]
-
-
-def _package_files(module: str) -> list[Path]:
-    parts = module.split(".")
-    package = ".".join(parts[:2]) if parts[0] == "matbench" else parts[0]
-    spec = importlib.util.find_spec(package)
-    if spec is None or spec.origin is None:
-        return []
-    origin = Path(spec.origin)
-    return sorted(origin.parent.rglob("*.py")) if spec.submodule_search_locations else [origin]
+    every = [code_of(plugin) for _, plugin in sorted(installed("algorithms").items())]
+    digests = [one.digest for one in every if "numba" in one.parts]
+    return kernels.home() / sha256(" ".join(digests).encode()).hexdigest()[:16]

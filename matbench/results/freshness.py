@@ -9,6 +9,7 @@ from pathlib import Path
 from attrs import asdict, frozen
 from cattrs.preconf.json import make_converter
 
+from matbench import code
 from matbench.files.writing import write_text
 from matbench.plans import plan as plans
 from matbench.plans import plugins
@@ -18,25 +19,19 @@ from matbench.scene import Scene
 
 FILE = "scores.json"
 TABLES = ("results.csv", "cells.csv")
-_MODULES = (
-    "measures/metrics",
-    "measures/prediction",
-    "regions",
-    "scene",
-    "results/scores",
-    "measures/volume_metrics",
-    "measures/volumes",
-    "measures/warping",
-)
-
 _json = make_converter()
 
 
 @cache
 def digest() -> str:
     """Sixteen hexadecimal digits over all code that turns maps into scores, that of plug-ins' metrics included."""
-    parts = [sha256((Path(__file__).parents[1] / f"{name}.py").read_bytes()).hexdigest() for name in _MODULES]
-    parts += sorted(plugins.code_digest(plugin) for plugin in plugins.installed("metrics").values())
+    parts = [
+        code.of_file(
+            Path(__file__).with_name("scores.py"), alone=True
+        ).digest,  # not the store and the plan that it reads
+        code.of_module("matbench.regions").digest,
+        *sorted(plugins.code_digest(plugin) for plugin in plugins.installed("metrics").values()),
+    ]
     return plans.digest(parts)
 
 

@@ -1,16 +1,17 @@
 """Solving the cells of a plan on a Dask cluster.
 
 A worker solves each cell as this machine would: in a process of its own, watched by a keeper, in a
-temporary folder. It sends that folder back as bytes. Users' own files with methods are sent to the worker.
-Scenes are not: the worker reads them from its own data folder, or from the one named here if it has that,
-and compares digests. A worker with other code or another scene declines the cell.
+temporary folder. It sends that folder back as bytes. Users' own files with methods are sent to the worker, with what
+they import beside them. Files that a method reads are not, as they may be large: each worker needs them by the same
+path. Scenes are not sent either: the worker reads them from its own data folder, or from the one named here if it has
+that, and compares digests. A worker with other code or another scene declines the cell.
 
 Dask exchanges tasks as pickles: whoever can reach the scheduler can run programs on the workers.
 """
 
 import atexit
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from multiprocessing import current_process
@@ -23,7 +24,7 @@ from uuid import uuid4
 
 from attrs import define, evolve, frozen
 
-from matbench import spec
+from matbench import code, spec
 from matbench.errors import UserError, failure
 from matbench.files.unzip import ArchiveError
 from matbench.plans import plugins
@@ -49,12 +50,13 @@ class Task:
     run
         The name of the run on the cluster: the topic of its events, and part of its tasks' keys.
     files
-        Name and content of the users' own files with methods.
+        The users' own files that hold methods: the name of each, and by their paths below its folder the content of
+        all that it imports from there, itself included.
     """
 
     run: str
     cell: Cell
-    files: tuple[tuple[str, bytes], ...]
+    files: tuple[tuple[str, Mapping[str, bytes]], ...]
     settings: Settings
 
 
@@ -103,7 +105,7 @@ def run_cells(
     """
     if settings.dask == "local":
         settings = evolve(settings, threads=settings.threads_each(), memory=settings.memory_each())
-    files = tuple((Path(file).name, Path(file).read_bytes()) for file in plan.plugin_files)
+    files = tuple((Path(file).name, _with_helpers(Path(file))) for file in plan.plugin_files)
     with _client(settings) as client:
         from distributed import as_completed
 
@@ -147,6 +149,11 @@ def run_cells(
             with telling:
                 waiting.clear()  # late events tell nothing any more
             client.cancel(list(futures.values()), force=True)
+
+
+def _with_helpers(file: Path) -> dict[str, bytes]:
+    """A user's own file and what it imports beside it: path below its folder -> content."""
+    return {name: one.read_bytes() for name, one in code.of_file(file).beside(file.parent).items()}
 
 
 def _other_workers(client: Any, declined: Sequence[Reply]) -> list[str]:
@@ -313,17 +320,16 @@ _keepers = Keepers(SimpleQueue(), Lock())
 atexit.register(_keepers.dismiss)
 
 
-def _write_files(files: Sequence[tuple[str, bytes]], folder: Path) -> tuple[str, ...]:
+def _write_files(files: Sequence[tuple[str, Mapping[str, bytes]]], folder: Path) -> tuple[str, ...]:
     """Write the users' files, each into a folder of its own: names may be equal, and count in digests. Their paths."""
-    paths = []
-    for number, (name, content) in enumerate(files):
-        if Path(name).name != name:  # a name such as ../x would be written elsewhere
-            raise ValueError(f"{name!r} is no file name")
-        path = folder / str(number) / name
-        path.parent.mkdir()
-        path.write_bytes(content)
-        paths.append(str(path))
-    return tuple(paths)
+    for number, (_, contents) in enumerate(files):
+        for name, content in contents.items():
+            path = folder / str(number) / name
+            if not path.resolve().is_relative_to((folder / str(number)).resolve()):  # ../x would be written elsewhere
+                raise ValueError(f"{name!r} is no path below a folder")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+    return tuple(str(folder / str(number) / name) for number, (name, _) in enumerate(files))
 
 
 def _data_folder(named: Path | None) -> Path | None:
@@ -349,7 +355,7 @@ def _why_declined(cell: Cell, files: Sequence[str], root: Path | None) -> str:
     except (ImportError, OSError, UserError) as error:
         return f"the worker cannot use {name}: {failure(error)}"
     if not is_same:
-        return f"the worker has other code of {name}, or other versions of numpy, numba or OpenCV: install the same"
+        return f"the worker has other code of {name}, or other versions of what it imports: install the same"
     try:
         if _scene_digest(cell.scene, root) != cell.scene_digest:
             return f"the worker's {cell.scene} is another one: give all workers the same data"

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 from attrs import define, evolve, field
 
 from matbench.errors import UserError
+from matbench.plans import plugins
 from matbench.plans.limits import cores
 from matbench.runs.store import FINAL, Outcome, Store, maps_digest, write_cell
 from matbench.scenes import views_only
@@ -103,6 +104,7 @@ class Keeping:
                 # earlier cells may have spoiled a shared process: this cell gets a second chance in a fresh one.
                 # Not after a timeout: the cell would take the whole time again.
                 _empty(draft)
+            plugins.read_ahead(job.cell.method.algorithm, job.plugin_files)
             self.child = Child.fork(job, self.inbox, self.is_confining)
             self._attempt(job, draft, end)
 

@@ -193,7 +193,7 @@ def test_runs_are_joined_where_they_are_alike_and_refused_where_not(
     assert run(capsys, "score", one, two)[0] == 2
 
     mine = tmp_path / "mine.py"
-    mine.write_text(METHODS.read_text() + "\n# other code\n")
+    mine.write_text(METHODS.read_text() + "\nOTHER = 1\n")
     other = done(tmp_path / "other", "flat", plugin=mine)
     with pytest.raises(UserError, match=r"flat has other code or parameters in .*other.* than in .*one"):
         join([one, other], tmp_path / "joint")

@@ -330,7 +330,7 @@ def test_only_and_the_dry_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     )
     assert left(names, "all") == [("flat", "asked for again"), failed, ("noise", "its files are damaged")]
     assert ("flat", "not computed yet") in left(names, repeats=2)
-    plugin.write_text(plugin.read_text() + "\n# other code\n")
+    plugin.write_text(plugin.read_text() + "\nOTHER = 1\n")
     assert [why for _, why in left(names)] == ["code changed"] * 3
     assert {p: p.stat().st_mtime_ns for p in (tmp_path / "run").rglob("*")} == before
     with pytest.raises(UserError, match="is not what it was when the run was planned"):
@@ -535,7 +535,7 @@ def test_what_changes_decides_what_is_done_again(tmp_path: Path, monkeypatch: py
         assert mean("avg", second) != pytest.approx(mean("avg", first))
         assert standing(run).tables == ""
 
-        other.write_text(other.read_text() + "\n# longer\n")
+        other.write_text(other.read_text() + "\nLONGER = 1\n")
         assert why() == ["strange: code changed"]
         assert {path: path.stat().st_mtime_ns for path in run.glob("cells/*/cell.json")} == cells
 

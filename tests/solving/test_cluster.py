@@ -152,12 +152,20 @@ def _works(process: psutil.Process) -> bool:
 
 def test_a_cluster_of_this_machine(tmp_path: Path) -> None:
     pytest.importorskip("distributed", reason="Dask is not installed: pip install 'matbench-stereo[cluster]'")
-    line = [sys.executable, "-m", "matbench", "compare", "-a", "flat", "exits", "-s", SMALL, "--out", "run"]
-    line += ["--plugin", str(METHODS), "--dask", "local", "--jobs", "2"]
+    (tmp_path / "mine" / "tools").mkdir(parents=True)
+    (tmp_path / "mine" / "tools" / "level.py").write_text("LEVEL = 2.5\n")
+    (tmp_path / "mine" / "helped.py").write_text(
+        "import numpy as np\nfrom matbench import Estimate\n\nclass Helped:\n    def solve(self, scene, context):\n"
+        "        from tools.level import LEVEL\n"
+        "        return Estimate({scene.ref: np.full((scene.height, scene.width), LEVEL, np.float32)})\n"
+    )
+    line = [sys.executable, "-m", "matbench", "compare", "-a", "flat", "exits", "helped", "-s", SMALL, "--out", "run"]
+    line += ["--plugin", str(METHODS), "mine/helped.py", "--dask", "local", "--jobs", "2"]
     done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=240)
     assert done.returncode == 1, done.stderr
     assert "crashed  exits on" in done.stdout
     assert "ok  flat on" in done.stdout
+    assert "ok  helped on" in done.stdout, "what it imports from its folder went with it"
     assert "Traceback" not in done.stderr
 
 

@@ -1,0 +1,16 @@
+"""Where kernels that numba has compiled are kept."""
+
+from pathlib import Path
+
+from matbench.files.own_folders import cache_folder
+
+
+def home() -> Path:
+    """The folder of all of them, below the person's folder for what can be made anew.
+
+    Raises
+    ------
+    UserError
+        If there is no home folder.
+    """
+    return cache_folder() / "kernels"
