@@ -303,8 +303,6 @@ def _kind_of(default: object) -> Any:
     """The type of a parameter that has no annotation: that of its default, if it is a simple one."""
     if isinstance(default, Path):
         return Path
-    if isinstance(default, Path):
-        return Path
     return type(default) if type(default) in (bool, int, float, str) else Any
 
 
