@@ -73,8 +73,7 @@ def slice_(
     cell
         Part of the cell's name or key; not needed where there is only one.
     """
-    from matbench import spec
-    from matbench.algorithm import Context
+    from matbench.algorithm import Context, unsupported
     from matbench.plans import plugins
     from matbench.plans.limits import cores
     from matbench.plans.record_option import Recording
@@ -95,14 +94,12 @@ def slice_(
         raise UserError(
             f"{chosen.method.algorithm} is in a file of its own: add --plugin {shlex.join(plan.plugin_files)}"
         )
-    found = plugins.algorithm(chosen.method.algorithm, plugin)
-    method = spec.build(found.name, found.load(), chosen.method.params)
+    method = plugins.algorithm(chosen.method.algorithm, plugin).make(chosen.method.params)
     scene = _scene(chosen, data, console)
     if wanted.rows and wanted.rows[0] >= scene.height:
         raise UserError(f"row {row} of {scene.name}: 0 to {scene.height - 1} is possible")
     stem = _stem(out, run, f"slice-{chosen}")
-    unsupported = getattr(method, "unsupported_reason", None)
-    if unsupported and (reason := unsupported(scene)):
+    if reason := unsupported(method, scene):
         raise UserError(f"{chosen} was skipped: {reason}")
     probe = RecordingProbe(wanted.at(scene.height))
     with console.status(f"{chosen}: solving once more"):
@@ -220,10 +217,7 @@ def _scene(cell: "Cell", data: Path | None, console: Console) -> "Scene":
 
 def _stored(store: "Store", cell: "Cell", scene: "Scene") -> "NDArray[np.float32] | None":
     """The stored map of the reference view of a cell that is ok."""
-    outcome = store.outcome(cell)
-    if outcome is None or outcome.status != "ok":
-        return None
-    return store.disparity(cell).get(scene.ref)
+    return store.read(cell).maps.get(scene.ref)
 
 
 def _stem(out: Path | None, run: Path, name: str) -> Path:

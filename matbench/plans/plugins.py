@@ -16,7 +16,7 @@ from typing import Any, Literal
 from attrs import frozen
 
 from matbench.errors import UserError, unknown
-from matbench.spec import first_line
+from matbench.spec import build, first_line
 
 Group = Literal["algorithms", "datasets", "metrics"]
 
@@ -56,6 +56,16 @@ class Plugin:
         except BaseException as error:  # whatever a module does when imported, sys.exit included
             why = f"{type(error).__name__}: {first_line(error)}"
             raise UserError(f"plug-in {self.name!r} from {self.source} cannot be imported: {why}") from error
+
+    def make(self, params: Mapping[str, object]) -> Any:
+        """An instance with these parameters, as values or as typed, the others at their defaults.
+
+        Raises
+        ------
+        UserError
+            If its module fails to import, or for a parameter or a value that it does not take.
+        """
+        return build(self.name, self.load(), params)
 
 
 @cache

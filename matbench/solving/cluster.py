@@ -22,7 +22,6 @@ from uuid import uuid4
 
 from attrs import define, evolve, frozen
 
-from matbench import spec
 from matbench.errors import UserError
 from matbench.files.unzip import ArchiveError
 from matbench.plans import plugins
@@ -333,7 +332,7 @@ def _unlike(cell: Cell, files: Sequence[str], root: Path | None) -> str:
 def _code(cell: Cell, files: Sequence[str]) -> str:
     """The digest of a cell's method, and of the files that it names: to know these, the method is imported."""
     plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in files])
-    return plugins.method_digest(plugin, spec.build(plugin.name, plugin.load(), cell.method.params))
+    return plugins.method_digest(plugin, plugin.make(cell.method.params))
 
 
 @cache

@@ -1,7 +1,7 @@
 """Working through a plan: each cell in a process of its own, results as they come."""
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from multiprocessing.connection import wait
 from typing import Any, Literal
 
@@ -9,7 +9,6 @@ from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
 from matbench.runs.store import Outcome, Store, write_cell
-from matbench.runs.todo import pending
 from matbench.solving.environment import kernels_kept, without_main
 from matbench.solving.keeper import Keeper, dismiss
 from matbench.solving.worker import Job
@@ -22,10 +21,11 @@ def run(
     plan: Plan,
     store: Store,
     settings: Settings,
+    todo: Sequence[Cell],
     preload: Iterable[str] = (),
     listen: Listener | None = None,
 ) -> None:
-    """Compute every cell of a plan that is not done.
+    """Compute cells of a plan.
 
     One cell at a time unless the settings say otherwise, so that seconds are comparable. Each is
     solved in a process that a keeper watches (`matbench.solving.keeper`), or on a cluster
@@ -39,6 +39,8 @@ def run(
 
     Parameters
     ----------
+    todo
+        Those that are not done (`matbench.runs.todo`).
     preload
         Modules that are imported once for all cells, besides the harness, such as those of the methods.
     listen
@@ -47,14 +49,13 @@ def run(
     told = listen or (lambda *_: None)
 
     def tell(event: Event, cell: Cell, outcome: Outcome | None) -> None:
-        if outcome is not None and store.outcome(cell, whole=False) != outcome:  # what was solved could not be kept
+        if outcome is not None and store.outcome(cell) != outcome:  # what was solved could not be kept
             store.try_out()
             with store.building(cell) as draft:
                 write_cell(draft, cell, outcome)
                 (draft / "log.txt").touch()
         told(event, cell, outcome)
 
-    todo = pending(plan, store, settings)
     if not todo:
         return
     store.sweep()
@@ -76,7 +77,7 @@ def _datasets(cells: Iterable[Cell]) -> list[str]:
 
 
 def _here(
-    plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Iterable[Cell], tell: Listener
+    plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Sequence[Cell], tell: Listener
 ) -> None:
     """Share out cells to keepers on this machine."""
     jobs = [

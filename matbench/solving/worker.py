@@ -19,8 +19,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from matbench import spec
-from matbench.algorithm import Algorithm, Context, Estimate
+from matbench.algorithm import Algorithm, Context, Estimate, unsupported
 from matbench.errors import UserError
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
@@ -130,10 +129,8 @@ def _volume(estimate: Estimate, scene: Scene) -> StoredVolume | None:
 def _solve(
     method: Algorithm, scene: Scene, job: Job
 ) -> tuple[Outcome, dict[int, NDArray[np.float32]] | None, StoredVolume | None]:
-    unsupported = getattr(method, "unsupported_reason", None)
-    reason = unsupported(scene) if unsupported else None
-    if reason:
-        return Outcome("skipped", reason=str(reason)), None, None
+    if reason := unsupported(method, scene):
+        return Outcome("skipped", reason=reason), None, None
     context = Context(job.cell.seed, job.threads)
     start = time.perf_counter()
     try:
@@ -180,7 +177,7 @@ def run_cell(job: Job, draft: Path) -> Outcome:
     maps = volume = None
     try:
         plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
-        method = spec.build(plugin.name, plugin.load(), cell.method.params)
+        method = plugin.make(cell.method.params)
         if plugins.method_digest(plugin, method) != cell.method.code:
             raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
         scene = hide_truth(load_scene(cell.scene, job.settings.data))
