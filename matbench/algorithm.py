@@ -107,3 +107,9 @@ class Algorithm(Protocol):
 
 
 Presets = ClassVar[Mapping[str, Mapping[str, object]]]
+
+
+def unsupported(method: Algorithm, scene: Scene) -> str:
+    """Why a method says that it cannot solve a scene; empty if it does not say so."""
+    asked = getattr(method, "unsupported_reason", None)
+    return str(asked(scene) or "") if asked else ""

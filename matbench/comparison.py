@@ -22,10 +22,11 @@ from matbench.plans.plan import Cell, Plan, make_plan, methods
 from matbench.plans.record_option import RecordOption
 from matbench.plans.settings import Settings
 from matbench.results import freshness, scores
-from matbench.results.repeats import unsteady
+from matbench.results.scores import Tables
 from matbench.runs import provenance
 from matbench.runs.lock import locked
 from matbench.runs.store import FolderLost, Outcome, Store
+from matbench.runs.todo import Todo, pending
 from matbench.scene import NotInScene, Scene
 from matbench.scenes.catalogue import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
 from matbench.scenes.dataset import Listing
@@ -71,8 +72,17 @@ class Comparison:
         """What readers of the scores should know of the scenes, a line each."""
         return [f"{name}: {said}" for name, scene in self.scenes.items() if (said := beyond_range(scene))]
 
-    def run(self, listen: run.Listener | None = None) -> None:
+    def pending(self) -> Todo:
+        """What is not done yet, from one look at every stored cell; no other may work on the run meanwhile."""
+        return pending(self.plan, self.store, self.settings)
+
+    def run(self, listen: run.Listener | None = None, todo: Todo | None = None) -> None:
         """Compute what is not done yet.
+
+        Parameters
+        ----------
+        todo
+            What `pending` said, by whoever has held the run since; it is looked up if not given.
 
         Raises
         ------
@@ -97,20 +107,45 @@ class Comparison:
 
             try:
                 self.store.write_plan(self.plan)
-                run.run(self.plan, self.store, self.settings, preload, listening)
+                left = (todo or self.pending()).cells
+                run.run(self.plan, self.store, self.settings, left, preload, listening)
             except OSError as error:
                 raise FolderLost.of(self.folder, error) from error
 
-    def tables(self) -> "tuple[pd.DataFrame, pd.DataFrame]":
-        """Score the stored maps; write and return ``results.csv`` and ``cells.csv``."""
-        results = scores.results(self.plan, self.store, self.scenes)
-        cells = scores.cells(self.plan, self.store)
+    def tables(self) -> Tables:
+        """Score the stored maps; write ``results.csv`` and ``cells.csv``, and ``reliability.csv`` if it has rows."""
         with locked(self.folder):
+            found = scores.tables(self.plan, self.store, self.scenes)
             self.store.sweep()
-            for name, table in (("results.csv", results), ("cells.csv", cells)):
+            for name, table in (("results.csv", found.results), ("cells.csv", found.cells)):
                 write_text(self.folder / name, table.to_csv(index=False))
-            freshness.record(self.plan, self.store, self.scenes)
-        return results, cells
+            if len(found.reliability):
+                write_text(self.folder / "reliability.csv", found.reliability.to_csv(index=False))
+            else:
+                (self.folder / "reliability.csv").unlink(missing_ok=True)
+            made = freshness.Made.now(self.plan, self.store, self.scenes, found.outcomes)
+            evolve(made, unsteady=found.unsteady).write(self.store)
+        return found
+
+    def kept(self, todo: Todo, is_ablation: bool = False) -> Tables | None:
+        """The tables as they lie in the folder, if they and the page are what would be made now; else None.
+
+        Parameters
+        ----------
+        todo
+            What `pending` has just said.
+        """
+        if todo.cells or len(todo.outcomes) < len(self.plan.cells):
+            return None
+        found = freshness.made(self.store)
+        if found is None or not found.page:
+            return None
+        now = freshness.Made.now(self.plan, self.store, self.scenes, todo.outcomes)
+        page = freshness.page_digest(self.store, self._asked(is_ablation))
+        if found != evolve(now, unsteady=found.unsteady, page=page):
+            return None
+        self.store.sweep()
+        return scores.read(self.folder, found.unsteady, todo.outcomes)
 
     def sweeps(self, results: "pd.DataFrame") -> "list[Sweep]":
         """The curves of whatever takes several numbers; written as ``sweeps.csv`` if there are any."""
@@ -131,29 +166,19 @@ class Comparison:
         write_text(self.folder / "ablation.tex", switches.latex(table))
         return table
 
-    def report(
-        self,
-        results: "pd.DataFrame",
-        cells: "pd.DataFrame",
-        ablation: "pd.DataFrame | None" = None,
-        sweeps: "Sequence[Sweep]" = (),
-    ) -> Path:
-        """Write ``report.html``."""
+    def report(self, tables: Tables, ablation: "pd.DataFrame | None" = None, sweeps: "Sequence[Sweep]" = ()) -> Path:
+        """Write ``report.html``: every map that it shows is read once more."""
         from matbench.reports import page
 
-        reliability = scores.reliabilities(self.plan, self.store, self.scenes)
-        if len(reliability):
-            write_text(self.folder / "reliability.csv", reliability.to_csv(index=False))
         stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.scored}
-        path = self.folder / "report.html"
-
-        outcomes = {key: self.store.outcome(cell) for key, cell in stored.items()}
+        path = self.folder / freshness.PAGE
+        outcomes = {key: tables.outcomes.get(cell.key) for key, cell in stored.items()}
 
         def disparity(algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
-            outcome = outcomes[algorithm, params, scene, seed]
-            if outcome is None or outcome.status != "ok":
-                return None
-            return self.store.disparity(stored[algorithm, params, scene, seed])[self.scenes[scene].ref]
+            names = algorithm, params, scene, seed
+            solved = self.store.read(stored[names])
+            # one that has changed since it was scored has no picture
+            return solved.maps.get(self.scenes[scene].ref) if solved.outcome == outcomes[names] else None
 
         def volume(algorithm: str, params: str, scene: str, seed: int) -> StoredVolume | None:
             outcome = outcomes[algorithm, params, scene, seed]
@@ -165,14 +190,14 @@ class Comparison:
             page.Report(
                 title=self.folder.resolve().name,
                 command=self.command,
-                results=results,
-                cells=cells,
+                results=tables.results,
+                cells=tables.cells,
                 maps=disparity,
                 scenes=self.scenes,
-                facts=self._facts(cells),
+                facts=self._facts(tables),
                 ablation=ablation,
                 sweeps=tuple(sweeps),
-                reliability=reliability,
+                reliability=tables.reliability,
                 higher=frozenset(m.name for m in scores.metrics() if m.better == "higher"),
                 volumes=volume,
                 histories={key: outcome.history for key, outcome in outcomes.items() if outcome is not None},
@@ -181,19 +206,27 @@ class Comparison:
                 rows=self.settings.record.rows if self.settings.record is not None else (),
             ),
         )
+        if (made := freshness.made(self.store)) is not None:
+            drawn = freshness.page_digest(self.store, self._asked(ablation is not None))
+            evolve(made, page=drawn).write(self.store)
         return path
 
-    def _facts(self, cells: "pd.DataFrame") -> dict[str, str]:
+    def _asked(self, is_ablation: bool) -> list[object]:
+        """What decides the page besides the tables and what they are made from."""
+        rows = self.settings.record.rows if self.settings.record is not None else ()
+        return [self.command, self.folder.resolve().name, list(rows), is_ablation, dict(self.plan.spellings)]
+
+    def _facts(self, found: Tables) -> dict[str, str]:
         """What the cells ran on, each on its own: a run may go on elsewhere."""
         from matbench.reports import tables
 
-        outcomes = [o for o in (self.store.outcome(cell, whole=False) for cell in self.plan.cells) if o is not None]
+        outcomes = [found.outcomes[cell.key] for cell in self.plan.cells if cell.key in found.outcomes]
         threads = [{"threads": str(o.threads)} for o in outcomes if o.threads]
         seeds = {"seeds": ", ".join(str(seed) for seed in self.plan.request["seeds"]), "scorer": freshness.digest()}
         facts = {**provenance.combined([*(o.ran_on for o in outcomes), *threads]), **seeds}
-        if differing := unsteady(self.plan, self.store):
-            facts["not repeatable"] = "; ".join(differing)
-        if note := tables.timing_note(cells):
+        if found.unsteady:
+            facts["not repeatable"] = "; ".join(found.unsteady)
+        if note := tables.timing_note(found.cells):
             facts["times"] = note
         if self.remarks:
             facts["ranges"] = "; ".join(self.remarks)
@@ -395,7 +428,10 @@ def compare(
         repeats=repeats,
     )
     with locked(comparison.folder):
-        comparison.run()
-        results, cells = comparison.tables()
-        comparison.report(results, cells, sweeps=comparison.sweeps(results))
-    return results
+        todo = comparison.pending()
+        comparison.run(todo=todo)
+        tables = comparison.kept(todo)
+        if tables is None:
+            tables = comparison.tables()
+            comparison.report(tables, sweeps=comparison.sweeps(tables.results))
+    return tables.results

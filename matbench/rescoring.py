@@ -11,7 +11,7 @@ from matbench.errors import UserError
 from matbench.plans.plan import Cell, Method, Plan
 from matbench.plans.settings import Settings
 from matbench.results import archive
-from matbench.runs.store import Store
+from matbench.runs.store import Outcome, Store
 from matbench.scene import Scene
 from matbench.scenes.catalogue import data_root, load_scene
 
@@ -91,7 +91,7 @@ def join(folders: Sequence[Path], out: Path) -> Store:
     for store in stores:
         store.check_place()
     plans = [store.plan() for store in stores]
-    chosen: dict[str, tuple[Cell, Store]] = {}
+    chosen: dict[str, tuple[Cell, Store, Outcome | None]] = {}
     scenes: dict[str, tuple[str, Store]] = {}
     codes: dict[str, tuple[Method, Store]] = {}
     for store, plan in zip(stores, plans, strict=True):
@@ -102,19 +102,19 @@ def join(folders: Sequence[Path], out: Path) -> Store:
             method, other = codes.setdefault(str(cell.method), (cell.method, store))
             if (method.code, method.params) != (cell.method.code, cell.method.params):
                 raise _unlike(str(cell.method), "has other code or parameters", store, other)
-            known, other = chosen.setdefault(cell.key, (cell, store))
-            mine, theirs = store.outcome(cell), other.outcome(known)
+            mine = store.read(cell).outcome
+            _, other, theirs = chosen.setdefault(cell.key, (cell, store, mine))
             if mine and theirs and mine.maps != theirs.maps and {mine.status, theirs.status} == {"ok"}:
                 raise _unlike(str(cell), "has other maps, so that method does not repeat itself", store, other)
             if mine and (theirs is None or theirs.status != "ok"):
-                chosen[cell.key] = cell, store
+                chosen[cell.key] = cell, store, mine
     spellings = {name: of for plan in plans for name, of in plan.spellings.items()}
     files = tuple(dict.fromkeys(file for plan in plans for file in plan.plugin_files))
     joined = Store.open(
-        out, Plan(tuple(cell for cell, _ in chosen.values()), files, spellings), " + ".join(map(str, folders))
+        out, Plan(tuple(cell for cell, *_ in chosen.values()), files, spellings), " + ".join(map(str, folders))
     )
-    for cell, store in chosen.values():
-        if store.outcome(cell) is not None:
+    for cell, store, outcome in chosen.values():
+        if outcome is not None:
             with joined.building(cell) as draft:
                 for path in archive.files_of(store, cell):
                     shutil.copyfile(path, draft / path.name, follow_symlinks=False)

@@ -250,7 +250,7 @@ def test_what_is_no_materiality_is_said_and_costs_nothing_else(tmp_path: Path) -
     ready = comparison.prepare(
         "solid[material=1.5]", SMALL, out=tmp_path / "run", plugin=[METHODS], settings=Settings(volumes=True)
     )
-    assert not comparison.run.pending(ready.plan, ready.store, ready.settings)
+    assert not ready.pending().cells
 
 
 def test_predictions_are_scored_with_and_without_truth(tmp_path: Path) -> None:
@@ -271,10 +271,11 @@ def test_predictions_are_scored_with_and_without_truth(tmp_path: Path) -> None:
     ready = comparison.prepare("flat[value=2]", held, out=tmp_path / "blind", plugin=[METHODS])
     ready.run()
     ready = evolve(ready, scenes={held: blind})
-    alone, _ = ready.tables()
+    made = ready.tables()
+    alone = made.results
     assert set(alone.metric) == {"prediction_psnr", "prediction_coverage"}
     assert _rows(alone, "prediction_psnr")["flat"] == by_params["flat", "value=2.0"]
-    page = ready.report(alone, pd.read_csv(tmp_path / "blind" / "cells.csv", keep_default_na=False))
+    page = ready.report(made)
     assert "There is no ground truth" in page.read_text()
 
 
@@ -334,11 +335,7 @@ def test_killed_and_taken_up_again(tmp_path: Path) -> None:
     process.wait()
     ready = comparison.prepare(["flat", "slow"], SMALL, out=tmp_path / "run", plugin=[METHODS])
     assert ready.store.outcome(ready.plan.cells[0]).status == "ok"  # type: ignore[union-attr]
-    assert [c.method.algorithm for c in matbench_pending(ready)] == ["slow"]
-
-
-def matbench_pending(ready: comparison.Comparison) -> list[comparison.run.Cell]:
-    return comparison.run.pending(ready.plan, ready.store, ready.settings)
+    assert [c.method.algorithm for c in ready.pending().cells] == ["slow"]
 
 
 def wait_until(happens: object, seconds: float = 60) -> None:
@@ -461,7 +458,7 @@ def test_a_scene_spelled_in_two_ways_keeps_its_place_on_the_curve(tmp_path: Path
     assert ready.plan.spellings == {"synthetic/box[size=48x36 views=5]": "synthetic/box[size=48x36]"}
     assert ready.store.plan() == ready.plan
     ready.run()
-    (sweep,) = ready.sweeps(ready.tables()[0])
+    (sweep,) = ready.sweeps(ready.tables().results)
     assert sweep.values == (2, 3, 5)
 
 

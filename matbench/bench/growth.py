@@ -128,8 +128,7 @@ def chosen(patterns: Sequence[str]) -> list[str]:
 
 def _instance(name: str) -> Algorithm:
     (one,) = spec.parse(METHODS[name])
-    plugin = plugins.algorithm(one.name)
-    made: Algorithm = spec.build(plugin.name, plugin.load(), one.options)
+    made: Algorithm = plugins.algorithm(one.name).make(one.options)
     return made
 
 

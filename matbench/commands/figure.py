@@ -209,10 +209,7 @@ def _scene(cell: "Cell", data: Path | None, console: Console) -> "Scene":
 
 def _stored(store: "Store", cell: "Cell", scene: "Scene") -> "NDArray[np.float32] | None":
     """The stored map of the reference view of a cell that is ok."""
-    outcome = store.outcome(cell)
-    if outcome is None or outcome.status != "ok":
-        return None
-    return store.disparity(cell).get(scene.ref)
+    return store.read(cell).maps.get(scene.ref)
 
 
 def _lacking(store: "Store", cells: "Sequence[Cell]") -> str:

@@ -20,10 +20,11 @@ from matbench.plans.limits import crowded
 from matbench.reports import curves, tables, terminal
 from matbench.reports import switches as effects
 from matbench.results import scores
-from matbench.results.repeats import unsteady
+from matbench.results.freshness import PAGE
+from matbench.results.scores import Tables
 from matbench.runs.lock import locked
 from matbench.runs.store import FINAL, FolderLost
-from matbench.runs.todo import explained, pending
+from matbench.runs.todo import Todo, explained
 from matbench.scenes.catalogue import DATA_VARIABLE, data_root
 
 
@@ -72,8 +73,9 @@ def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
         voice.say(crowd)
     with locked(ready.folder), _ended_as_by_ctrl_c():
         try:
-            stopped = _run(ready, voice)
-            cells = publish(ready, options.metric, is_ablation, voice, stopped)
+            todo = ready.pending()
+            stopped = _run(ready, todo, voice)
+            cells = publish(ready, options.metric, is_ablation, voice, stopped, ready.kept(todo, is_ablation))
         except FolderLost as error:
             print(f"matbench: stopped: {error}", file=sys.stderr)
             return FAILED
@@ -117,15 +119,30 @@ def show_plan(ready: Comparison, options: Options) -> int:
 
 
 def publish(
-    ready: Comparison, metric: str, is_ablation: bool, voice: Voice, stopped: bool = False, say_paths: bool = True
+    ready: Comparison,
+    metric: str,
+    is_ablation: bool,
+    voice: Voice,
+    stopped: bool = False,
+    kept: Tables | None = None,
+    say_paths: bool = True,
 ) -> Any:
-    """Score the run, write and print its tables, write its report; returns the table of cells."""
+    """Score the run, write and print its tables, write its report; returns the table of cells.
+
+    Parameters
+    ----------
+    kept
+        Tables that lie there with their page, and are what would be written (`Comparison.kept`).
+    """
     with voice.busy("scoring"):
-        results, cells = ready.tables()
+        found = ready.tables() if kept is None else kept
+        results, cells = found.results, found.cells
         sweeps = ready.sweeps(results)
         switches = ready.ablation(results) if is_ablation else None
-    with voice.busy("drawing the report"):
-        report = ready.report(results, cells, switches, sweeps)
+    report = ready.folder / PAGE
+    if kept is None:
+        with voice.busy("drawing the report"):
+            report = ready.report(found, switches, sweeps)
     written = {"scores": ready.folder / "results.csv", "report": report}
     if sweeps:
         written["curves"] = ready.folder / "sweeps.csv"
@@ -141,7 +158,7 @@ def publish(
         _print_tables(results, cells, switches, sweeps, metric, voice.talk)
         if results.empty:
             voice.say(tables.none_scored(cells))
-        for line in unsteady(ready.plan, ready.store):
+        for line in found.unsteady:
             voice.say(f"does not repeat itself: {line}")
         if say_paths:
             _say_paths(ready, written, voice)
@@ -230,16 +247,15 @@ def say_missing(missing: Sequence[str], options: Options) -> None:
         )
 
 
-def _run(ready: Comparison, voice: Voice) -> bool:
+def _run(ready: Comparison, todo: Todo, voice: Voice) -> bool:
     """Run a comparison and show progress; True if it was interrupted."""
-    todo = pending(ready.plan, ready.store, ready.settings)
-    total = len(ready.plan.cells)
-    if len(todo) < total:
+    total, left = len(ready.plan.cells), len(todo.cells)
+    if left < total:
         what = "are done already" if ready.settings.only is None else "stay as they are"
-        voice.say(f"{total - len(todo)} of {total} cells {what} in {ready.folder}")
+        voice.say(f"{total - left} of {total} cells {what} in {ready.folder}")
     try:
-        with Progress(voice.talk, todo, done=total - len(todo)) as progress:
-            ready.run(progress)
+        with Progress(voice.talk, todo.cells, done=total - left) as progress:
+            ready.run(progress, todo)
     except KeyboardInterrupt:
         return True
     return False

@@ -100,6 +100,14 @@ class Plan:
         return tuple(cell for cell in self.cells if not cell.repeat)
 
     @property
+    def questions(self) -> tuple[tuple[Cell, ...], ...]:
+        """The cells, those that repeat one another together: the one that is scored, then its repeats."""
+        found: dict[tuple[object, ...], list[Cell]] = {}
+        for cell in self.cells:
+            found.setdefault(cell.question[:-1], []).append(cell)
+        return tuple(tuple(sorted(cells, key=lambda c: c.repeat)) for cells in found.values())
+
+    @property
     def request(self) -> dict[str, Any]:
         """What was asked for, without code and pixels: the same request resumes the same run."""
         methods = {str(c.method): [c.method.algorithm, dict(c.method.params)] for c in self.cells}
@@ -128,7 +136,7 @@ def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[
     found: dict[str, Method] = {}
     for one in spec.expand(selectors):
         plugin = plugins.algorithm(one.name, files)
-        instance = spec.build(plugin.name, plugin.load(), one.options)
+        instance = plugin.make(one.options)
         if not callable(getattr(instance, "solve", None)):
             raise UserError(f"{plugin.name} from {plugin.source} is no method: it has no solve(scene, context)")
         spec.refuse_silent(plugin.name, instance, one.options)

@@ -57,6 +57,16 @@ class Plugin:
         except BaseException as error:  # whatever a module does when imported, sys.exit included
             raise UserError(f"plug-in {self.name!r} from {self.source} cannot be imported: {failure(error)}") from error
 
+    def make(self, params: Mapping[str, object]) -> Any:
+        """An instance with these parameters, as values or as typed, the others at their defaults.
+
+        Raises
+        ------
+        UserError
+            If its module fails to import, or for a parameter or a value that it does not take.
+        """
+        return spec.build(self.name, self.load(), params)
+
 
 @cache
 def installed(group: Group) -> Mapping[str, Plugin]:
@@ -200,13 +210,6 @@ def method_digest(plugin: Plugin, instance: object) -> str:
         except OSError as error:
             raise UserError(f"{plugin.name}: {said!r} cannot be read: {error.strerror}") from error
     return digest.hexdigest()
-
-
-def unsupported(method: object, scene: object) -> str:
-    """Why a method does not support a scene, in its own words; empty if it does."""
-    ask = getattr(method, "unsupported_reason", None)
-    reason = ask(scene) if ask is not None else None
-    return str(reason) if reason else ""
 
 
 def kernel_cache() -> Path:

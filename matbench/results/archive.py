@@ -78,7 +78,7 @@ def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
             raise UserError(
                 f"the tables of {str(folder)!r} are stale, {why}: type matbench score {shlex.quote(str(folder))} first"
             )
-        done = [cell for cell in plan.cells if store.outcome(cell) is not None]
+        done = [cell for cell in plan.cells if store.read(cell).outcome is not None]
         paths = [path for name in TOP if _is_plain(path := folder / name)]
         paths += [path for cell in done for path in files_of(store, cell)]
         _write(place, folder, sorted(paths))

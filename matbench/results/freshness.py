@@ -4,7 +4,9 @@ import json
 from collections.abc import Mapping
 from functools import cache
 from hashlib import sha256
+from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 from attrs import asdict, frozen
 from cattrs.preconf.json import make_converter
@@ -14,11 +16,14 @@ from matbench.files.writing import write_text
 from matbench.plans import plan as plans
 from matbench.plans import plugins
 from matbench.plans.plan import Plan
-from matbench.runs.store import Store
+from matbench.runs.store import Outcome, Store
 from matbench.scene import Scene
 
 FILE = "scores.json"
-TABLES = ("results.csv", "cells.csv")
+TABLES = ("results.csv", "cells.csv", "reliability.csv")
+PAGE = "report.html"
+_DRAWING, _SOURCES = ("reports", "recording", "results", "measures"), (".py", ".j2", ".css", ".js")
+
 _json = make_converter()
 
 
@@ -46,22 +51,45 @@ class Made:
     truth
         Scene -> digest of its ground truth and regions (`Scene.truth_digest`).
     cells
-        Digest of what was scored: the cells, how each ended, its maps.
+        Digest of what was scored: the cells, all that is known of how each ended, its maps.
     tables
-        File -> SHA-256.
+        File -> SHA-256; empty for one that is not there.
+    unsteady
+        The cells whose repeats differ, a line each (`matbench.results.scores.Tables`).
+    page
+        Digest of the page and of what it was drawn by and from besides; empty until it is drawn.
     """
 
     scorer: str
     truth: Mapping[str, str]
     cells: str
     tables: Mapping[str, str]
+    unsteady: tuple[str, ...] = ()
+    page: str = ""
+
+    @classmethod
+    def now(cls, plan: Plan, store: Store, scenes: Mapping[str, Scene], outcomes: Mapping[str, Outcome]) -> "Made":
+        """How the tables that lie in a run's folder were made, if they were made now, of these outcomes."""
+        truth = {cell.scene: scenes[cell.scene].truth_digest for cell in plan.cells}
+        tables = {name: _sha256(store.folder / name) for name in TABLES}
+        return cls(digest(), truth, _cells(store, outcomes), tables)
+
+    def write(self, store: Store) -> None:
+        """Keep it with the tables."""
+        write_text(store.folder / FILE, json.dumps(asdict(self), indent=1))
 
 
-def record(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> None:
-    """Write down how the tables that lie in a run's folder were made, just now."""
-    truth = {cell.scene: scenes[cell.scene].truth_digest for cell in plan.cells}
-    made = Made(digest(), truth, _cells(plan, store), {name: _sha256(store.folder / name) for name in TABLES})
-    write_text(store.folder / FILE, json.dumps(asdict(made), indent=1))
+def page_digest(store: Store, facts: Any) -> str:
+    """Digest of a run's page, of the code that draws pages, and of what else a page is made from, as plain values."""
+    return plans.digest([_sha256(store.folder / PAGE), _drawing(), facts]) if (store.folder / PAGE).exists() else ""
+
+
+@cache
+def _drawing() -> str:
+    """Digest of all code and templates from which a page follows, wherever in the harness."""
+    here = Path(__file__).parents[1]
+    files = [file for folder in _DRAWING for file in sorted((here / folder).rglob("*")) if file.suffix in _SOURCES]
+    return plans.digest([sha256(file.read_bytes()).hexdigest() for file in files])
 
 
 def made(store: Store) -> Made | None:
@@ -79,16 +107,25 @@ def fault(plan: Plan, store: Store) -> str:
         return "there are none that say how they were made"
     if found.scorer != digest():
         return f"they were made by another scorer ({found.scorer}, not {digest()})"
-    if any(_sha256(store.folder / name) != found.tables.get(name) for name in TABLES):
+    if any(_sha256(store.folder / name) != found.tables.get(name, "") for name in TABLES):
         return "they are not as they were written"
-    if found.cells != _cells(plan, store):
+    outcomes = {cell.key: store.outcome(cell) for cell in plan.cells}
+    if found.cells != _cells(store, {key: outcome for key, outcome in outcomes.items() if outcome is not None}):
         return "cells were computed since"
     return ""
 
 
-def _cells(plan: Plan, store: Store) -> str:
-    outcomes = [(cell.key, store.outcome(cell, whole=False)) for cell in plan.cells]
-    return plans.digest(sorted((key, o.status, o.maps) for key, o in outcomes if o is not None))
+def _cells(store: Store, outcomes: Mapping[str, Outcome]) -> str:
+    told = [(key, _json.unstructure(o), _size(store, key) if o.has_volume else 0) for key, o in outcomes.items()]
+    return plans.digest(sorted(told, key=itemgetter(0)))
+
+
+def _size(store: Store, key: str) -> int:
+    """Bytes of a cell's volume, which has no digest; 0 if none was kept."""
+    try:
+        return (store.folder / "cells" / key / "volume.npz").stat().st_size
+    except OSError:
+        return 0
 
 
 def _sha256(path: Path) -> str:

@@ -1,12 +1,13 @@
 """Does a method repeat itself? The same cell solved several times, each in a fresh process."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
-from matbench.plans.plan import Cell, Plan
-from matbench.runs.store import FINAL, Outcome, Store
+from matbench.plans.plan import Cell
+from matbench.runs.store import FINAL, Outcome, Solved
 
 
 @frozen
@@ -37,38 +38,37 @@ class Repeats:
             return f"differ: {self.answers} answers of {self.solved}"
         return f"same: {self.solved}" if self.solved == self.asked else f"{self.solved} of {self.asked}"
 
-
-def repeats(plan: Plan, store: Store) -> dict[str, Repeats]:
-    """Key of each cell that is solved several times -> what came of it."""
-    groups: dict[tuple[object, ...], list[Cell]] = {}
-    for cell in plan.cells:
-        groups.setdefault(cell.question[:-1], []).append(cell)
-    return {cells[0].key: _judged(cells, store) for cells in groups.values() if len(cells) > 1}
-
-
-def unsteady(plan: Plan, store: Store) -> list[str]:
-    """The cells whose repeats differ, a line each."""
-    return [
-        f"{found.cell}: {found.solved} solves gave {found.answers} answers, "
-        f"which differ in {100 * found.differ:.3g} % of the pixels"
-        for found in repeats(plan, store).values()
-        if found.answers > 1
-    ]
+    @property
+    def unsteady(self) -> str:
+        """How its answers differ, as a line; empty if they do not."""
+        if self.answers < 2:
+            return ""
+        differ = f"which differ in {100 * self.differ:.3g} % of the pixels"
+        return f"{self.cell}: {self.solved} solves gave {self.answers} answers, {differ}"
 
 
-def _judged(cells: Sequence[Cell], store: Store) -> Repeats:
-    done = [(cell, outcome) for cell in cells if (outcome := store.outcome(cell)) is not None]
-    ok = [cell for cell, outcome in done if outcome.status == "ok"]
-    answers = {outcome.maps for _, outcome in done if outcome.maps}
-    failed = next(((c, o) for c, o in done if c.repeat and o.status not in FINAL), None)
-    share = _share(ok, store) if len(answers) > 1 else 0.0
-    return Repeats(cells[0], len(cells), len(ok), len(answers), share, failed)
+def judged(cell: Cell, asked: int, solves: Iterable[Solved]) -> Repeats:
+    """What came of a cell that is asked for several times: of its maps two are held at once."""
+    first: Solved | None = None
+    solved, answers, alike = 0, set[str](), ""
+    failed: tuple[Cell, Outcome] | None = None
+    unlike: NDArray[np.bool_] = np.zeros(1, np.bool_)  # pixel by pixel, of the maps of all views
+    for one in solves:
+        if one.outcome is None:
+            continue
+        solved += one.outcome.status == "ok"
+        answers |= {one.outcome.maps} - {""}
+        if one.cell.repeat and one.outcome.status not in FINAL and failed is None:
+            failed = one.cell, one.outcome
+        if one.maps and first is None:
+            first = one
+            alike = one.outcome.maps
+        elif one.maps and first is not None and one.outcome.maps != alike:
+            unlike = unlike | _unlike(first, one)
+    return Repeats(cell, asked, solved, len(answers), float(unlike.mean()), failed)
 
 
-def _share(cells: Sequence[Cell], store: Store) -> float:
-    """Share of pixels, of the maps of all views, that are not the same in all cells."""
-    first, *rest = (np.concatenate([m.ravel() for _, m in sorted(store.disparity(c).items())]) for c in cells)
-    if any(other.shape != first.shape for other in rest):
-        return 1.0
-    unlike = [~((first == other) | (np.isnan(first) & np.isnan(other))) for other in rest]
-    return float(np.any(unlike, axis=0).mean())
+def _unlike(one: Solved, other: Solved) -> NDArray[np.bool_]:
+    """(pixels,) where two cells' maps, of all views, are not the same; everywhere if they are of other sizes."""
+    a, b = (np.concatenate([values.ravel() for _, values in sorted(cell.maps.items())]) for cell in (one, other))
+    return ~((a == b) | (np.isnan(a) & np.isnan(b))) if a.shape == b.shape else np.ones(1, np.bool_)

@@ -1,10 +1,13 @@
 """Tables of a run, computed from its stored maps: no method runs again for a new metric."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
+from itertools import chain
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from attrs import field, frozen
 from numpy.typing import NDArray
 
 from matbench.errors import UserError
@@ -14,8 +17,8 @@ from matbench.measures.volume_metrics import VolumeMetric, reliability
 from matbench.measures.volumes import StoredVolume, rays_of
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
-from matbench.results.repeats import repeats
-from matbench.runs.store import Store
+from matbench.results.repeats import Repeats, judged
+from matbench.runs.store import Outcome, Solved, Store
 from matbench.scene import Scene
 
 AnyMetric = Metric | VolumeMetric | PredictionMetric
@@ -32,6 +35,9 @@ CELL_COLUMNS = (
     "peak_mb",
     "threads",
     "alone",
+    "processor_seconds",
+    "others_seconds",
+    "doubt",
     "work",
     "reason",
     "cell",
@@ -39,6 +45,7 @@ CELL_COLUMNS = (
     "maps",
     "repeats",
 )
+RELIABILITY_COLUMNS = ("algorithm", "params", "scene", "seed", "materiality", "observed", "points")
 
 
 def metrics() -> tuple[AnyMetric, ...]:
@@ -75,12 +82,36 @@ def of_volumes(name: str) -> bool:
     return any(metric.name == name and isinstance(metric, VolumeMetric) for metric in metrics())
 
 
-def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFrame:
-    """One row for each finished cell, region of the reference view and metric.
+@frozen(eq=False)
+class Tables:
+    """What one pass over the stored cells of a run gives.
 
-    Columns are `RESULT_COLUMNS`: shares in per cent of `pixels`, errors in pixels of the pair.
-    Volumes have rows where they were kept. The prediction of a view held out has one region,
-    ``all``, and that view's label.
+    Parameters
+    ----------
+    results
+        Columns `RESULT_COLUMNS`, one row for each cell that is ok, region of the reference view and metric: shares
+        in per cent of `pixels`, errors in pixels of the pair. Volumes have rows where they were kept. The prediction
+        of a view held out has one region, ``all``, and that view's label.
+    cells
+        Columns `CELL_COLUMNS`, one row for each cell that is scored: what became of it and what it cost.
+    reliability
+        The reliability curve of every volume that was kept, over the reference view's known truth: algorithm, params,
+        scene, seed, and the columns of `matbench.measures.volume_metrics.reliability`.
+    unsteady
+        The cells whose repeats differ, a line each.
+    outcomes
+        Key -> what became of each cell that is stored whole, repeats too.
+    """
+
+    results: pd.DataFrame
+    cells: pd.DataFrame
+    reliability: pd.DataFrame
+    unsteady: tuple[str, ...] = ()
+    outcomes: Mapping[str, Outcome] = field(factory=dict)
+
+
+def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
+    """Score a run: every cell is read once, and its rows of all tables are made of that one reading.
 
     Raises
     ------
@@ -88,28 +119,77 @@ def results(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFra
         If a scene is not the one that the maps are of.
     """
     rows: list[tuple[object, ...]] = []
-    for cell in plan.scored:
-        outcome = store.outcome(cell)
-        if outcome is None or outcome.status != "ok":
-            continue
-        scene = scenes[cell.scene]
-        _check_scene(cell, scene, store)
-        rows += _of_maps(cell, scene, store.disparity(cell)[scene.ref])
-        if outcome.has_volume:
-            rows += _of_volumes(cell, scene, store.volume(cell))
-        if scene.held_out is not None:
-            rows += _predicted(cell, scene, store.disparity(cell)[scene.ref])
-    return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
+    lines: list[tuple[object, ...]] = []
+    curves: list[pd.DataFrame] = []
+    unsteady: list[str] = []
+    outcomes: dict[str, Outcome] = {}
+
+    def read(cell: Cell) -> Solved:
+        solved = store.read(cell)
+        if solved.outcome is not None:
+            outcomes[cell.key] = solved.outcome
+        return solved
+
+    for cell, *others in plan.questions:
+        solved, scene = read(cell), scenes[cell.scene]
+        repeats = judged(cell, 1 + len(others), chain([solved], map(read, others))) if others else None
+        lines.append(_line(solved, repeats))
+        unsteady += [repeats.unsteady] if repeats is not None and repeats.unsteady else []
+        if solved.maps:
+            _check_scene(solved, scene)
+            rows += _scored(solved, scene)
+            curves += _curve(solved, scene)
+    return Tables(
+        pd.DataFrame(rows, columns=list(RESULT_COLUMNS)),
+        pd.DataFrame(lines, columns=list(CELL_COLUMNS)),
+        pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(columns=list(RELIABILITY_COLUMNS)),
+        tuple(unsteady),
+        outcomes,
+    )
 
 
-def _check_scene(cell: Cell, scene: Scene, store: Store) -> None:
+def read(folder: Path, unsteady: tuple[str, ...], outcomes: Mapping[str, Outcome]) -> Tables:
+    """What `tables` gave when it was written to a run folder: the same types, and the same numbers to the last bit."""
+    return Tables(
+        _read(folder / "results.csv", RESULT_COLUMNS, ("seed", "value", "pixels")),
+        _read(folder / "cells.csv", CELL_COLUMNS, ("seed", "seconds", "warmup_seconds", "peak_mb", "threads", "alone")),
+        _read(folder / "reliability.csv", RELIABILITY_COLUMNS, ("seed", "materiality", "observed", "points")),
+        unsteady,
+        outcomes,
+    )
+
+
+def _read(path: Path, columns: Sequence[str], numbers: Sequence[str]) -> pd.DataFrame:
+    if not path.exists():
+        return pd.DataFrame(columns=list(columns))
+    # a method may be called "nan"; and no parser of tables gives every number back to the last bit
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    return table.assign(**{name: [_number(text) for text in table[name]] for name in numbers})
+
+
+def _number(text: str) -> float | bool:
+    if text in ("True", "False"):
+        return text == "True"
+    return int(text) if text.removeprefix("-").isdigit() else float(text or "nan")
+
+
+def _scored(solved: Solved, scene: Scene) -> Iterator[tuple[object, ...]]:
+    """A cell's rows of the table of results."""
+    estimate = solved.maps[scene.ref]
+    yield from _of_maps(solved.cell, scene, estimate)
+    yield from _of_volumes(solved.cell, scene, solved.volume)
+    if scene.held_out is not None:
+        yield from _predicted(solved.cell, scene, estimate)
+
+
+def _check_scene(solved: Solved, scene: Scene) -> None:
     """Refuse to score maps against another scene than that which was solved."""
+    cell = solved.cell
     if scene.digest != cell.scene_digest:
         raise UserError(f"{cell.scene} is not what {cell.method} was given: it cannot be scored with the others")
-    maps = store.disparity(cell)
-    sizes = {values.shape for values in maps.values()}
-    if scene.ref not in maps or sizes != {(scene.height, scene.width)}:
-        raise UserError(f"{store.cell(cell) / 'disparity.npz'} holds no maps of {cell.scene}: remove {cell.key}")
+    sizes = {values.shape for values in solved.maps.values()}
+    if scene.ref not in solved.maps or sizes != {(scene.height, scene.width)}:
+        raise UserError(f"{solved.place / 'disparity.npz'} holds no maps of {cell.scene}: remove {cell.key}")
 
 
 def _head(cell: Cell, view: str, region: str) -> tuple[object, ...]:
@@ -142,51 +222,38 @@ def _predicted(cell: Cell, scene: Scene, estimate: NDArray[np.float32]) -> list[
     return [(*head, m.name, value_of(m, found, len(found)), m.unit, len(found)) for m in used]
 
 
-def reliabilities(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> pd.DataFrame:
-    """The reliability curve of every volume that was kept, over the reference view's known truth.
-
-    Columns: algorithm, params, scene, seed, and those of `matbench.measures.volume_metrics.reliability`.
-    """
-    curves = []
-    for cell in plan.scored:
-        outcome, scene = store.outcome(cell), scenes[cell.scene]
-        kept = store.volume(cell) if outcome is not None and outcome.has_volume else None
-        if kept is None or scene.ref not in kept.views or scene.ref not in scene.truth:
-            continue
-        (rays,) = rays_of(kept, scene, [np.isfinite(scene.truth[scene.ref])])
-        curve = reliability(rays)
-        names = {"algorithm": cell.method.algorithm, "params": cell.method.changed}
-        curves.append(pd.DataFrame({**names, "scene": cell.scene, "seed": cell.seed}, index=curve.index).join(curve))
-    columns = ["algorithm", "params", "scene", "seed", "materiality", "observed", "points"]
-    return pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(columns=columns)
+def _curve(solved: Solved, scene: Scene) -> list[pd.DataFrame]:
+    """The reliability curve of a cell's volume, if it was kept and can be judged."""
+    cell, kept = solved.cell, solved.volume
+    if kept is None or scene.ref not in kept.views or scene.ref not in scene.truth:
+        return []
+    (rays,) = rays_of(kept, scene, [np.isfinite(scene.truth[scene.ref])])
+    curve = reliability(rays)
+    names = {"algorithm": cell.method.algorithm, "params": cell.method.changed}
+    return [pd.DataFrame({**names, "scene": cell.scene, "seed": cell.seed}, index=curve.index).join(curve)]
 
 
-def _log_of(store: Store, cell: Cell) -> str:
+def _log_of(place: Path) -> str:
     """Where a cell's log lies in the run folder, to stand after its reason; nothing if it has none."""
-    log = store.cell(cell) / "log.txt"
+    log = place / "log.txt"
     printed = log.is_file() and log.stat().st_size > 0
-    return f" (log: {log.relative_to(store.folder).as_posix()})" if printed else ""
+    return f" (log: cells/{place.name}/log.txt)" if printed else ""
 
 
-def cells(plan: Plan, store: Store) -> pd.DataFrame:
-    """One row for each cell of the plan: what became of it and what it cost (`CELL_COLUMNS`)."""
-    rows: list[tuple[object, ...]] = []
-    repeated = repeats(plan, store)
-    for cell in plan.scored:
-        outcome = store.outcome(cell)
-        head = (cell.method.algorithm, cell.method.changed, cell.scene, cell.seed)
-        if outcome is None:
-            rows.append((*head, "interrupted", *[None] * 5, "", "not computed yet", cell.key, "", "", ""))
-            continue
-        found = repeated.get(cell.key)
-        status, reason, told_by = outcome.status, outcome.reason, cell
-        if found is not None and found.failed is not None and status == "ok":
-            told_by, failed = found.failed
-            status, reason = failed.status, f"repeat {told_by.repeat}: {failed.reason}"
-        if reason and status != "skipped":
-            reason += _log_of(store, told_by)
-        told = (cell.key, outcome.ran_on.get("machine", ""), outcome.maps, str(found or ""))
-        cost = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb, outcome.threads, outcome.alone)
-        work = " ".join(f"{name}={count}" for name, count in outcome.work.items())
-        rows.append((*head, status, *cost, work, reason, *told))
-    return pd.DataFrame(rows, columns=list(CELL_COLUMNS))
+def _line(solved: Solved, repeats: Repeats | None) -> tuple[object, ...]:
+    """A cell's row of the table of cells."""
+    cell, outcome, place = solved.cell, solved.outcome, solved.place
+    head = (cell.method.algorithm, cell.method.changed, cell.scene, cell.seed)
+    if outcome is None:
+        return *head, "interrupted", *[None] * 7, "", "", "not computed yet", cell.key, "", "", ""
+    status, reason = outcome.status, outcome.reason
+    if repeats is not None and repeats.failed is not None and status == "ok":
+        repeat, failed = repeats.failed
+        status, reason, place = failed.status, f"repeat {repeat.repeat}: {failed.reason}", place.with_name(repeat.key)
+    if reason and status != "skipped":
+        reason += _log_of(place)
+    told = (cell.key, outcome.ran_on.get("machine", ""), outcome.maps, str(repeats or ""))
+    cost = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb, outcome.threads, outcome.alone)
+    share = (outcome.processor_seconds, outcome.others_seconds, outcome.doubt)
+    work = " ".join(f"{name}={count}" for name, count in outcome.work.items())
+    return *head, status, *cost, *share, work, reason, *told

@@ -67,7 +67,7 @@ def standing(folder: Path) -> Standing:
     """
     store = Store(folder)
     plan = store.plan()
-    outcomes = {cell.key: store.outcome(cell, whole=False) for cell in plan.cells}
+    outcomes = {cell.key: store.outcome(cell) for cell in plan.cells}
     work = Work.read(folder) if is_locked(folder) else None
     now = time.time()
     begun = work.running if work else {}

@@ -73,7 +73,7 @@ def _outcome(store: Store, cell: Cell) -> Outcome:
         key = json.loads((store.cell(cell) / "cell.json").read_text(encoding="utf-8"))["cell"]["key"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise ArchiveError("what came is no cell") from error
-    outcome = store.outcome(cell)
+    outcome = store.read(cell).outcome
     if key != cell.key or outcome is None:
         raise ArchiveError("what came is a damaged cell" if key == cell.key else "what came is another cell")
     return outcome

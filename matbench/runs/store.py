@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from errno import EISDIR, ELOOP, ENOENT, ENOTDIR, ENOTEMPTY
+from functools import cached_property
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
@@ -94,6 +95,31 @@ class Outcome:
     processor_seconds: float | None = None
     others_seconds: float | None = None
     doubt: str = field(default="", converter=_one_line)
+
+
+@frozen(eq=False)
+class Solved:
+    """A stored cell, its facts and its maps read at one time: they belong together.
+
+    Parameters
+    ----------
+    outcome
+        None if it has not been computed, or its files are damaged.
+    place
+        Its folder.
+    maps
+        View index -> (H, W) disparity map, pixels per view step; empty unless it is ok.
+    """
+
+    cell: Cell
+    outcome: Outcome | None
+    place: Path
+    maps: Mapping[int, NDArray[np.float32]] = {}
+
+    @cached_property
+    def volume(self) -> StoredVolume | None:
+        """The volume that was kept, read when it is asked for; None where there is none, or a damaged one."""
+        return _volume(self.place) if self.outcome is not None and self.outcome.has_volume else None
 
 
 class FolderLost(UserError):
@@ -253,13 +279,8 @@ class Store:
         """Where a cell's files lie once it is done."""
         return self.folder / "cells" / cell.key
 
-    def outcome(self, cell: Cell, whole: bool = True) -> Outcome | None:
-        """What became of a cell, or None if it has not been computed, or its files are damaged.
-
-        Parameters
-        ----------
-        whole
-            Read its maps, too, and see whether they are what was stored.
+    def outcome(self, cell: Cell) -> Outcome | None:
+        """What became of a cell by its facts alone, or None if it has not been computed, or these are damaged.
 
         Raises
         ------
@@ -272,15 +293,37 @@ class Store:
             numbers = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb)
             if not all(isfinite(number) for number in numbers if number is not None):
                 return None
-            if whole and outcome.status == "ok":
-                maps = self.disparity(cell)
-                if outcome.maps and maps_digest(maps) != outcome.maps:
-                    return None
         except Exception as error:  # half a cell is no cell: it is computed anew
-            if isinstance(error, OSError) and error.errno is not None and error.errno not in _ABSENT:
-                raise FolderLost.of(self.folder, error) from error
+            self._check_readable(error)
             return None
         return outcome
+
+    def read(self, cell: Cell) -> "Solved":
+        """A cell with its maps, which are read once and must be those that were stored.
+
+        Without an outcome if it has not been computed, or its files are damaged.
+
+        Raises
+        ------
+        FolderLost
+            If the folder cannot be read: nobody knows what is in it.
+        """
+        outcome, place = self.outcome(cell), self.cell(cell)
+        if outcome is None or outcome.status != "ok":
+            return Solved(cell, outcome, place)
+        try:
+            maps = self.disparity(cell)
+        except Exception as error:  # half a cell is no cell: it is computed anew
+            self._check_readable(error)
+            return Solved(cell, None, place)
+        if outcome.maps and maps_digest(maps) != outcome.maps:
+            return Solved(cell, None, place)
+        return Solved(cell, outcome, place, maps)
+
+    def _check_readable(self, error: Exception) -> None:
+        """Raise FolderLost for an error that does not say that a file is missing or damaged."""
+        if isinstance(error, OSError) and error.errno is not None and error.errno not in _ABSENT:
+            raise FolderLost.of(self.folder, error) from error
 
     def stale(self, plan: Plan) -> list[Cell]:
         """The stored cells that are none of the plan's: of other code, other pixels, other repeats."""
@@ -380,10 +423,14 @@ class Store:
 
     def volume(self, cell: Cell) -> StoredVolume | None:
         """The stored volume, or None where there is none, or a damaged one."""
-        try:
-            return StoredVolume.read(self.cell(cell) / "volume.npz")
-        except (ValueError, OSError):
-            return None
+        return _volume(self.cell(cell))
+
+
+def _volume(place: Path) -> StoredVolume | None:
+    try:
+        return StoredVolume.read(place / "volume.npz")
+    except (ValueError, OSError):
+        return None
 
 
 def write_cell(

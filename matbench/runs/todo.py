@@ -1,19 +1,47 @@
 """What of a plan is left to do, and why."""
 
-from collections.abc import Iterator
+from collections.abc import Mapping
+
+from attrs import field, frozen
 
 from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
 from matbench.runs.store import FINAL, Outcome, Store
 
 
-def pending(plan: Plan, store: Store, settings: Settings) -> list[Cell]:
+@frozen(eq=False)
+class Todo:
+    """What a run computes, from one look at every cell of its plan.
+
+    Parameters
+    ----------
+    cells
+        What is to be computed, in the plan's order.
+    outcomes
+        Key -> what became of each cell that is stored whole.
+    """
+
+    cells: tuple[Cell, ...] = ()
+    outcomes: Mapping[str, Outcome] = field(factory=dict)
+
+
+def pending(plan: Plan, store: Store, settings: Settings) -> Todo:
     """The cells that a run computes: by default those without a final outcome, or without what was asked for besides.
 
     That is a recording that holds what is asked for, and the volume of a method that has one.
-    `Settings.only` takes fewer, or all.
+    `Settings.only` takes fewer, or all. Every map is read: one that is damaged is computed anew.
     """
-    return [cell for cell, _ in _pending(plan, store, settings)]
+    cells, outcomes = [], {}
+    for cell in plan.cells:
+        outcome = store.read(cell).outcome
+        if outcome is not None:
+            outcomes[cell.key] = outcome
+        is_failed = outcome is not None and outcome.status not in FINAL
+        is_missing = not is_failed and bool(_lacks(cell, outcome, store, settings))
+        due = {"all": True, "failed": is_failed, "missing": is_missing, None: is_failed or is_missing}
+        if due[settings.only]:
+            cells.append(cell)
+    return Todo(tuple(cells), outcomes)
 
 
 def explained(plan: Plan, store: Store, settings: Settings) -> list[tuple[Cell, str]]:
@@ -22,22 +50,14 @@ def explained(plan: Plan, store: Store, settings: Settings) -> list[tuple[Cell, 
     for old in store.stale(plan):
         before.setdefault(old.question, []).append(old)
     out = []
-    for cell, outcome in _pending(plan, store, settings):
+    todo = pending(plan, store, settings)
+    for cell in todo.cells:
+        outcome = todo.outcomes.get(cell.key)
         why = _reason(cell, outcome, store, settings)
         if outcome is None and cell.question in before:
             why = _changed(cell, before[cell.question])
         out.append((cell, why))
     return out
-
-
-def _pending(plan: Plan, store: Store, settings: Settings) -> Iterator[tuple[Cell, Outcome | None]]:
-    for cell in plan.cells:
-        outcome = store.outcome(cell)
-        is_failed = outcome is not None and outcome.status not in FINAL
-        is_missing = not is_failed and bool(_lacks(cell, outcome, store, settings))
-        due = {"all": True, "failed": is_failed, "missing": is_missing, None: is_failed or is_missing}
-        if due[settings.only]:
-            yield cell, outcome
 
 
 def _lacks(cell: Cell, outcome: Outcome | None, store: Store, settings: Settings) -> str:

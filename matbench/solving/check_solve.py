@@ -20,8 +20,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from matbench import spec
-from matbench.algorithm import Context
+from matbench.algorithm import Context, unsupported
 from matbench.errors import failure
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import limits, plugins
@@ -84,13 +83,10 @@ def solve_here(method: Method, files: Sequence[Path], trial: Trial, log: Path) -
     """Solve one trial in this process; an exception of the method becomes the answer's `error`."""
     with _printing_to(log):
         try:
-            plugin = plugins.algorithm(method.algorithm, files)
-            instance = spec.build(plugin.name, plugin.load(), method.params)
+            instance = plugins.algorithm(method.algorithm, files).make(method.params)
             scene, before = trial.scene, trial.views.copy()
-            unsupported = getattr(instance, "unsupported_reason", None)
-            reason = unsupported(scene) if unsupported else None
-            if reason:
-                return Answer(reason=str(reason))
+            if reason := unsupported(instance, scene):
+                return Answer(reason=reason)
             estimate = instance.solve(scene, Context(threads=trial.threads))
             touched = not np.array_equal(scene.views, before)
             maps = checked(estimate, scene)

@@ -24,7 +24,7 @@ from uuid import uuid4
 
 from attrs import define, evolve, frozen
 
-from matbench import code, spec
+from matbench import code
 from matbench.errors import UserError, failure
 from matbench.files.unzip import ArchiveError
 from matbench.plans import plugins
@@ -367,7 +367,7 @@ def _why_declined(cell: Cell, files: Sequence[str], root: Path | None) -> str:
 def _code_digest(cell: Cell, files: Sequence[str]) -> str:
     """The digest of a cell's method and of the files that it names; an instance is built, as only that names them."""
     plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in files])
-    return plugins.method_digest(plugin, spec.build(plugin.name, plugin.load(), cell.method.params))
+    return plugins.method_digest(plugin, plugin.make(cell.method.params))
 
 
 @cache

@@ -7,8 +7,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from matbench import spec
-from matbench.algorithm import Context, Estimate
+from matbench.algorithm import Context, Estimate, unsupported
 from matbench.errors import UserError, failure
 from matbench.plans import limits, plugins
 from matbench.plans.plan import Cell
@@ -55,9 +54,8 @@ def _solve(line: Connection, cell: Cell, files: Sequence[Path], views: Path, hea
     try:
         scene, threads = views_only.read(views), limits.cores()
         processes.use_threads(threads)
-        plugin = plugins.algorithm(cell.method.algorithm, files)
-        method = spec.build(plugin.name, plugin.load(), cell.method.params)
-        if reason := plugins.unsupported(method, scene):
+        method = plugins.algorithm(cell.method.algorithm, files).make(cell.method.params)
+        if reason := unsupported(method, scene):
             said = f"was skipped: {reason}"
         else:
             probe = CapturingProbe(wanted.at(scene.height))

@@ -1,7 +1,7 @@
 """Computing the cells of a plan: each in a process of its own, here or on a cluster."""
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from multiprocessing.connection import wait
 from typing import Any, Literal
 
@@ -9,7 +9,6 @@ from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
 from matbench.runs.store import Outcome, Store, write_cell
-from matbench.runs.todo import pending
 from matbench.solving.environment import kernel_cache_in_use, without_main
 from matbench.solving.keeper import Keeper, dismiss
 from matbench.solving.worker import Job
@@ -22,10 +21,11 @@ def run(
     plan: Plan,
     store: Store,
     settings: Settings,
+    todo: Sequence[Cell],
     preload: Iterable[str] = (),
     listen: Listener | None = None,
 ) -> None:
-    """Compute every cell of a plan that is not done.
+    """Compute cells of a plan.
 
     One cell runs at a time unless the settings say otherwise: only then are seconds comparable. Each cell
     is solved in a process that a keeper watches (`matbench.solving.keeper`), or on a cluster
@@ -43,11 +43,20 @@ def run(
     ------
     FolderLost
         If cells cannot be written.
+
+    Parameters
+    ----------
+    todo
+        Those that are not done (`matbench.runs.todo`).
+    preload
+        Modules that are imported once for all cells, besides the harness, such as those of the methods.
+    listen
+        Told as each cell starts and ends.
     """
     told = listen or (lambda *_: None)
 
     def tell(event: Event, cell: Cell, outcome: Outcome | None) -> None:
-        if outcome is not None and store.outcome(cell, whole=False) != outcome:
+        if outcome is not None and store.outcome(cell) != outcome:
             # the cell's folder holds something else: the outcome was never written there (crash, full disk, cluster)
             store.try_out()
             with store.building(cell) as draft:
@@ -55,7 +64,6 @@ def run(
                 (draft / "log.txt").touch()
         told(event, cell, outcome)
 
-    todo = pending(plan, store, settings)
     if not todo:
         return
     store.sweep()
@@ -77,7 +85,7 @@ def _dataset_modules(cells: Iterable[Cell]) -> list[str]:
 
 
 def _run_here(
-    plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Iterable[Cell], tell: Listener
+    plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Sequence[Cell], tell: Listener
 ) -> None:
     """Solve cells on this machine, as many at once as the settings say."""
     jobs = [

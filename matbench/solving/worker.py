@@ -24,8 +24,7 @@ from attrs import evolve, field, frozen
 from cattrs.preconf.json import make_converter
 from numpy.typing import NDArray
 
-from matbench import spec
-from matbench.algorithm import Algorithm, Context, Estimate
+from matbench.algorithm import Algorithm, Context, Estimate, unsupported
 from matbench.errors import UserError, failure, one_line
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
@@ -194,7 +193,7 @@ def _warm_up(method: Algorithm, scene: Scene, context: Context) -> Estimate:
 
 
 def _solve(method: Algorithm, scene: Scene, job: Job, keeper: KeeperLine) -> Answer:
-    reason = plugins.unsupported(method, scene)
+    reason = unsupported(method, scene)
     if reason:
         return Answer(Outcome("skipped", reason=reason))
     context = Context(job.cell.seed, job.threads)
@@ -241,7 +240,7 @@ def run_cell(order: Order, keeper: KeeperLine) -> Outcome:
     cell, answer = job.cell, Answer(Outcome("failed"))
     try:
         plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
-        method = spec.build(plugin.name, plugin.load(), cell.method.params)
+        method = plugin.make(cell.method.params)
         # files may have been edited since the plan was made: results must not stand under the old digest
         if plugins.method_digest(plugin, method) != cell.method.code:
             raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")

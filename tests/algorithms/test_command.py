@@ -235,7 +235,8 @@ def test_cells_of_programs_good_and_bad_and_a_changed_program_is_another_cell(tm
     def cells() -> dict[str, tuple[str, float]]:
         ready = prepare(chosen, "synthetic/box", out=tmp_path / "run")
         ready.run()
-        scores, found = ready.tables()
+        made = ready.tables()
+        scores, found = made.results, made.cells
         bad_1 = scores[(scores.metric == "total_bad_1") & (scores.region == "all")].set_index("params").value
         return {params: (status, bad_1.get(params)) for params, status in zip(found.params, found.status, strict=True)}
 

@@ -34,7 +34,7 @@ from matbench.results import freshness, scores
 from matbench.results.status import prune, standing
 from matbench.runs.lock import Work, locked
 from matbench.runs.store import FolderLost
-from matbench.runs.todo import explained, pending
+from matbench.runs.todo import explained
 
 PATIENCE = 900
 RAISES = "failed: ArithmeticError: the third digit is missing and more (mine.py:87)"
@@ -164,7 +164,7 @@ def test_killed_at_twenty_random_moments_it_ends_as_if_undisturbed(
     undisturbed = tmp_path / "undisturbed"
     wait_until(partial(_rests, start(undisturbed)), "the undisturbed run")
     again = comparison.prepare(METHODS, SCENE, out=undisturbed, seed=SEEDS, plugin=tmp_path / "plugin.py")
-    assert not pending(again.plan, again.store, again.settings)
+    assert not again.pending().cells
     again.tables()
     assert (run / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
 
@@ -262,7 +262,7 @@ def test_a_full_disk_stops_the_run_and_the_same_command_ends_it(tmp_path: Path) 
     names, scene = ["flat", "noise", "flat[value=2]"], "synthetic/box[size=240x180]"
     whole = comparison.prepare(names, scene, out=tmp_path / "whole", plugin=BEHAVED)
     whole.run()
-    assert len(whole.tables()[0])
+    assert len(whole.tables().results)
     assert (tmp_path / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
 
 
@@ -281,8 +281,8 @@ def test_a_file_system_that_is_lost_is_not_taken_for_an_empty_one(
     with monkeypatch.context() as patch:
         patch.setattr(Path, "read_text", lost)
         with pytest.raises(FolderLost, match="Stale file handle"):
-            pending(ready.plan, ready.store, ready.settings)
-    assert not pending(ready.plan, ready.store, ready.settings)
+            ready.pending()
+    assert not ready.pending().cells
     assert finished(tmp_path / "run") == before
     shutil.move(tmp_path / "run" / "cells", tmp_path / "elsewhere")  # unmounted: it looks empty
     again = evolve(ready, settings=Settings(only="all"))
@@ -366,7 +366,7 @@ def test_told_to_end_while_it_scores_it_ends_and_the_next_one_clears_away(
         return int(stop.value.code or 0)
 
     with monkeypatch.context() as patch:
-        patch.setattr(scores, "results", lambda *_: os.kill(os.getpid(), signal.SIGTERM))
+        patch.setattr(scores, "tables", lambda *_: os.kill(os.getpid(), signal.SIGTERM))
         assert ended() == 130
     told = capsys.readouterr()
     assert (told.out, told.err.splitlines()[-1]) == ("", "matbench: interrupted")
@@ -444,7 +444,7 @@ def test_names_with_separators_stay_inside(tmp_path: Path) -> None:
     (place / "cell.json").write_text('{"outcome": {"status": "ok"}}')
     spelled = '{"outcome": {"status": "failed", "reason": "one\\u001b[2J\\ntwo", "seconds": %s}}'
     (place / "cell.json").write_text(spelled % "1e999")
-    assert ready.store.outcome(ready.plan.cells[0]) is None
+    assert ready.store.read(ready.plan.cells[0]).outcome is None
     (place / "cell.json").write_text(spelled % "1")
     told = ready.store.outcome(ready.plan.cells[0])
     assert told is not None
@@ -452,7 +452,7 @@ def test_names_with_separators_stay_inside(tmp_path: Path) -> None:
     (place / "cell.json").write_text('{"outcome": {"status": "ok"}}')
     marker = tmp_path / "executed"
     np.savez(place / "disparity.npz", view_2=np.array([_Malice(str(marker))], object))
-    assert ready.store.outcome(ready.plan.cells[0]) is None
+    assert ready.store.read(ready.plan.cells[0]).outcome is None
     np.savez(place / "volume.npz", levels=np.array([_Malice(str(marker))], object), space=np.zeros(3), views=[0, 1])
     assert ready.store.volume(ready.plan.cells[0]) is None
     assert not marker.exists()
@@ -518,7 +518,7 @@ def test_what_changes_decides_what_is_done_again(tmp_path: Path, monkeypatch: py
     try:
         ready = prepared(write=True)
         ready.run()
-        first, _ = ready.tables()
+        first = ready.tables().results
         assert mean("mine", first) == pytest.approx(mean("avg", first))
         cells = {path: path.stat().st_mtime_ns for path in run.glob("cells/*/cell.json")}
         assert len(cells) == 3
@@ -530,7 +530,7 @@ def test_what_changes_decides_what_is_done_again(tmp_path: Path, monkeypatch: py
         assert why() == []
         again, left_out = open_run(run)
         assert not left_out
-        second, _ = again.tables()
+        second = again.tables().results
         assert mean("mine", second) == pytest.approx(10 * mean("avg", second))
         assert mean("avg", second) != pytest.approx(mean("avg", first))
         assert standing(run).tables == ""

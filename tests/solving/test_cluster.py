@@ -82,7 +82,7 @@ def test_a_worker_that_dies_and_one_that_comes_late(
     with meanwhile(disturb):
         ready.run(listen)
     assert not psutil.wait_procs(ended, timeout=60)[1], "what the dead worker had started"
-    cells = ready.tables()[1]
+    cells = ready.tables().cells
     by_name = cells.set_index("algorithm")
     assert (by_name.status["tells"] == "ok").all()
     assert "SIGSEGV" in by_name.reason["segfaults"]
@@ -119,12 +119,12 @@ def test_a_worker_that_dies_and_one_that_comes_late(
     )
     lacking = prepare(tmp_path / "lacking", "flat", scene="./mine", dask=machines.address)
     lacking.run()
-    (why,) = lacking.tables()[1].reason
+    (why,) = lacking.tables().cells.reason
     assert "the worker has not ./mine: " in why
     cell = evolve(there.plan.cells[0], key="0" * 16, method=evolve(there.plan.cells[0].method, code="0" * 64))
     other = evolve(there, plan=evolve(there.plan, cells=(cell,)))
     other.run()
-    assert "the worker has other code of flat" in other.tables()[1].reason[0]
+    assert "the worker has other code of flat" in other.tables().cells.reason[0]
 
     # Ctrl-C ends what the workers do
     long = prepare(tmp_path / "long", "flat", "tells[wait=3600]", "tells[wait=3599]", dask=machines.address)

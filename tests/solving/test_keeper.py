@@ -30,7 +30,7 @@ def run(folder: Path, *algorithms: str, **settings: object) -> pd.DataFrame:
         list(algorithms), SMALL, out=folder, plugin=[ROUGH, METHODS], settings=Settings(**settings)
     )
     ready.run()
-    cells = ready.tables()[1].set_index("algorithm")
+    cells = ready.tables().cells.set_index("algorithm")
     cells["log"] = [(folder / "cells" / key / "log.txt").read_text(errors="replace") for key in cells.cell]
     assert not list((folder / "cells").glob(".*")), "no drafts"
     return cells
@@ -100,7 +100,7 @@ def test_a_keeper_that_is_killed_is_replaced(tmp_path: Path) -> None:
     ready.run(listen)
     assert seen["orphans"] == "crashed its keeper was killed"
     assert seen["flat"].startswith("ok")
-    cells = ready.tables()[1].set_index("algorithm")
+    cells = ready.tables().cells.set_index("algorithm")
     assert (cells.status["orphans"], cells.reason["orphans"]) == EXPECTED["orphans"][:2], "the cell says so, too"
     assert not list((tmp_path / "run" / "cells").glob(".*")), "what the killed keeper left"
 
@@ -115,10 +115,10 @@ def test_a_cell_that_goes_wrong_when_it_is_done_again_is_not_what_it_was(tmp_pat
     )
     ready = comparison.prepare("turns", SMALL, out=tmp_path / "run", plugin=plugin)
     ready.run()
-    assert ready.tables()[1].status.item() == "ok"
+    assert ready.tables().cells.status.item() == "ok"
     (tmp_path / "now").touch()
     evolve(ready, settings=Settings(only="all")).run()
-    assert ready.tables()[1].status.item() == "crashed"
+    assert ready.tables().cells.status.item() == "crashed"
 
 
 def test_a_keeper_shares_a_process_among_cells_that_want_the_same(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_processes_threads_and_marks(tmp_path: Path) -> None:
         ready.run()
         scene = next(iter(ready.scenes.values()))
         maps = [ready.store.disparity(cell)[scene.ref] for cell in ready.plan.cells]
-        return [float(np.unique(one).item()) for one in maps], ready.tables()[1]
+        return [float(np.unique(one).item()) for one in maps], ready.tables().cells
 
     processes, cells = look("alone", threads=1)
     assert len(set(processes)) == 4, "one process a cell"
