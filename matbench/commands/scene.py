@@ -191,5 +191,10 @@ def new(
     for remark in draft.remarks:
         console.say(f"• {remark}")
     console.say(f"written: {draft.path}")
-    console.say(f"next: matbench scene check {shlex.quote(str(folder))}")
+    if set("[],") & set(str(folder)):
+        console.say("next: rename the folder: brackets and commas in it cannot be told from a scene's options")
+        return DONE
+    # only what has a slash may hold blanks
+    path = f"./{folder}" if " " in str(folder) and "/" not in str(folder) else str(folder)
+    console.say(f"next: {shlex.join(['matbench', 'scene', 'check', path])}")
     return DONE

@@ -66,19 +66,21 @@ def test_pictures_that_do_not_belong_together_are_not_confirmed(
             Path(f"my desk/{number}.png"), load_scene(f"synthetic/{name}[n=2 seed={number} size=240x180]").views[0]
         )
     status, out, _ = run(capsys, "scene", "new", "my desk")
-    assert (status, out.splitlines()[-1]) == (0, "next: matbench scene check 'my desk'")
+    assert (status, out.splitlines()[-1]) == (0, "next: matbench scene check './my desk'")
     assert "A GUESS" in out
-    status, out, _ = run(capsys, "scene", "check", "my desk")
+    status, out, _ = run(capsys, "scene", "check", "./my desk")
     assert status == 1
     assert "no problems" not in out
     assert "not confirmed: order, shift, rows could not be measured" in out
     assert ("[predict=" in out) == (count > 2)
-    status, _, err = run(capsys, "compare", "-a", "sgbm", "-s", "my desk", "--out", "run")
+    status, _, err = run(capsys, "compare", "-a", "sgbm", "-s", "./my desk", "--out", "run")
     assert status == 2
     assert ("[predict=" in err) == (count > 2)
     if count > 2:
         assert "needs [predict=left] or [predict=right] after the scene" in err
-        assert run(capsys, "compare", "-a", "sgbm", "-s", "my desk[predict=left]", "--dry-run", "--out", "run")[0] == 0
+        assert (
+            run(capsys, "compare", "-a", "sgbm", "-s", "./my desk[predict=left]", "--dry-run", "--out", "run")[0] == 0
+        )
     else:
         assert "needs ground truth, or a third view" in err
 
