@@ -77,7 +77,7 @@ def slice_(
     from matbench.plans.record_option import RecordOption
     from matbench.reports import slice_figure
     from matbench.runs.store import Store
-    from matbench.solving.listening import listen
+    from matbench.solving.captured_solve import solve_captured
 
     store, console = Store(run), Console()
     plan = store.plan()
@@ -96,7 +96,7 @@ def slice_(
         raise UserError(f"row {row} of {scene.name}: 0 to {scene.height - 1} is possible")
     stem = _stem(out, run, f"slice-{chosen}")
     with console.status(f"{chosen}: solving once more"):
-        told = listen(chosen, plugin, scene, wanted.at(scene.height))
+        told = solve_captured(chosen, plugin, scene, wanted.at(scene.height))
     plane = slice_figure.epipolar_plane(scene, told.probe, told.estimate)
     if plane is None:
         raise UserError(f"{chosen.method} tells nothing of disparity space: no volume, no similarities")

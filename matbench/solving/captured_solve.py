@@ -1,4 +1,4 @@
-"""One solve that is listened to, for a figure: in a process that has no truth."""
+"""One solve of which all that the method tells is kept, for a figure: in a process that has no truth."""
 
 import os
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from matbench.solving.environment import kernel_cache_in_use, without_main
 from matbench.solving.worker import checked
 
 
-def listen(cell: Cell, files: Sequence[Path], scene: Scene, wanted: RecordOption) -> told.Told:
+def solve_captured(cell: Cell, files: Sequence[Path], scene: Scene, wanted: RecordOption) -> told.Told:
     """Have a process of its own solve a cell once more; what the method told, and its estimate.
 
     Raises
