@@ -11,7 +11,7 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
@@ -146,7 +146,8 @@ def _kernels_apart(package: str) -> Iterator[None]:
         yield
         return
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(Path(before or kernels.home()) / package)
+    with suppress(UserError):  # there is no home folder: numba finds a place, or compiles them anew
+        config.CACHE_DIR = str(Path(before or kernels.home()) / package)
     try:
         yield
     finally:

@@ -30,13 +30,9 @@ _json = make_converter()
 @cache
 def digest() -> str:
     """Sixteen hexadecimal digits over all code that turns maps into scores, that of plug-ins' metrics included."""
-    parts = [
-        code.of_file(
-            Path(__file__).with_name("scores.py"), alone=True
-        ).digest,  # not the store and the plan that it reads
-        code.of_module("matbench.regions").digest,
-        *sorted(plugins.code_digest(plugin) for plugin in plugins.installed("metrics").values()),
-    ]
+    scores = code.of_file(Path(__file__).with_name("scores.py"), alone=True)  # without store and plan, which it reads
+    parts = [scores.digest, code.of_module("matbench.regions").digest]
+    parts += sorted(plugins.code_digest(plugin) for plugin in plugins.installed("metrics").values())
     return plans.digest(parts)
 
 

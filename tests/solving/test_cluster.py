@@ -160,7 +160,7 @@ def test_a_cluster_of_this_machine(tmp_path: Path) -> None:
         "        return Estimate({scene.ref: np.full((scene.height, scene.width), LEVEL, np.float32)})\n"
     )
     line = [sys.executable, "-m", "matbench", "compare", "-a", "flat", "exits", "helped", "-s", SMALL, "--out", "run"]
-    line += ["--plugin", str(METHODS), "mine/helped.py", "--dask", "local", "--jobs", "2"]
+    line += ["--plugin", str(METHODS), "--plugin", "mine/helped.py", "--dask", "local", "--jobs", "2"]
     done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=240)
     assert done.returncode == 1, done.stderr
     assert "crashed  exits on" in done.stdout
