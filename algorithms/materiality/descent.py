@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from attrs import frozen
 
-from matbench.algorithms.materiality.passes import Energy, Floats
+from matbench.algorithms.materiality.objective import Energy
+from matbench.algorithms.materiality.passes import Count, Floats, Room
 from matbench.algorithms.materiality.rows import RISE as RISE
 from matbench.algorithms.materiality.rows import ROW, descend_rows, follow
 
@@ -104,7 +105,7 @@ class Descent:
         states["data"], states["momentum"], states["step"] = np.inf, 1, self.step
         at_once = 1 if told is not None else self.passes
         history: dict[str, list[float]] = {}
-        terms, full = energy.terms(kind), 1 / energy.scale
+        terms, counting = energy.terms(kind), Count(energy.pressure * (1 / energy.scale) / 2, energy.target, 0.0)
         for first in range(0, self.passes, max(1, at_once)):
             if states["stopped"].all():
                 break
@@ -112,11 +113,10 @@ class Descent:
                 told.look(mu, before, states["beta"])
             course = np.empty((at_once, 4, len(mu)))
 
-            def work(top: int, end: int, room: tuple[Floats, ...], course: Floats = course) -> None:
+            def work(top: int, end: int, room: Room, course: Floats = course) -> None:
                 descend_rows(
-                    mu, before, kind(1), *terms, energy.pressure * full / 2, energy.target,
-                    self.accelerated, self.tolerance, top, end, room, states, course,
-                )  # fmt: skip
+                    mu, before, *terms, counting, self.accelerated, self.tolerance, top, end, room, states, course
+                )
 
             energy.over_rows(work, kind, self.threads)
             for number, (data, count, adjacent, restart) in enumerate(course.sum(axis=2).tolist(), first):

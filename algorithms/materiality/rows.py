@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from matbench.algorithms.kernels import kernel
-from matbench.algorithms.materiality.passes import pass_rows
+from matbench.algorithms.kernels import helper, kernel
+from matbench.algorithms.materiality.passes import Data, Point, Ties, pass_rows
 
 RISE = 1e-6  # but at a restart, an energy exceeds that of the pass before by at most this share
 
@@ -38,17 +38,34 @@ def follow(total, last, momentum, beta, step, accelerated):  # type: ignore[no-u
     return True, rises, momentum, beta, step
 
 
+@helper
+def _data_of(data, y):  # type: ignore[no-untyped-def]
+    """`Data` of row y alone."""
+    return Data(data.rho[y : y + 1], data.full, data.views, data.samples, data.first, data.origin)
+
+
+@helper
+def _ties_of(ties, weights, y):  # type: ignore[no-untyped-def]
+    """`Ties` of row y alone; `weights` are those in `ties`."""
+    if weights is None:  # noqa: SIM108 - the compiler keeps one branch only where there are two
+        edges = None
+    else:
+        edges = weights[0][y : y + 1], weights[1][y : y + 1]
+    return Ties(edges, ties.across, ties.along)
+
+
 @kernel
 def descend_rows(  # type: ignore[no-untyped-def]
-    now, before, one, rho, full, views, pairs, links, rest, samples, first, origin, weights, across, along,
-    pressure, target, accelerated, tolerance, top, end, room, states, course,
-):  # fmt: skip
+    now, before, data, pairs, ties, count, accelerated, tolerance, top, end, room, states, course
+):
     """Passes over rows top..end, each row with a step and restarts of its own.
 
     Parameters
     ----------
-    now, before, rho ... room
-        As in `pass_rows`; the first two are overwritten with those after the last pass.
+    now, before
+        (rows, planes, columns) materialities, overwritten with those of the last two passes.
+    data, pairs, ties, count, room
+        As in `pass_rows`.
     accelerated, tolerance
         As in `Descent`; the latter is asked of a row's energy.
     states
@@ -57,33 +74,29 @@ def descend_rows(  # type: ignore[no-untyped-def]
         (passes, 4, rows), overwritten: data, count and adjacent energy of a row at its last accepted
         pass so far, and 1 for a restart, else 0.
     """
-    kind, unit = now.dtype.type, np.float64(full)
-    count = pressure / unit  # lambda / N, as the pressure is full / 2 of the derivative
+    kind, unit = now.dtype.type, np.float64(data.full)
+    weight = count.pressure / unit  # lambda / N, as the pressure is full / 2 of the derivative
     sums = np.empty((1, 3))
     for y in range(top, end):
         state, a, b = states[y], now[y : y + 1], before[y : y + 1]
+        data_here, ties_here = _data_of(data, y), _ties_of(ties, ties.weights, y)
         turned = False
         for number in range(len(course)):
             restart = False
             if not state.stopped:
-                if weights is None:  # noqa: SIM108 - the compiler keeps one branch only where there are two
-                    edges = None
-                else:
-                    edges = weights[0][y : y + 1], weights[1][y : y + 1]
                 pass_rows(
-                    a, b, kind(state.beta), one, rho[y : y + 1], full, views, pairs, links, rest, samples, first,
-                    origin, edges, across, along, pressure, target, 0.0, a, kind(2 * state.step / unit), 0, 1, room,
-                    b, None, sums,
+                    Point(a, b, kind(state.beta)), data_here, pairs, ties_here, count, a,
+                    kind(2 * state.step / unit), 0, 1, room, b, None, sums,
                 )  # fmt: skip
-                data, ties, excess = sums[0, 0] / (unit * unit), sums[0, 1] / unit, sums[0, 2] - target
-                counted = count * excess * excess
-                last, total = state.data + state.count + state.adjacent, data + counted + ties
+                paired, tied, excess = sums[0, 0] / (unit * unit), sums[0, 1] / unit, sums[0, 2] - count.target
+                counted = weight * excess * excess
+                last, total = state.data + state.count + state.adjacent, paired + counted + tied
                 accepted, restart, state.momentum, state.beta, state.step = follow(
                     total, last, state.momentum, state.beta, state.step, accelerated
                 )
                 state.made += 1
                 if accepted:
-                    state.data, state.count, state.adjacent = data, counted, ties
+                    state.data, state.count, state.adjacent = paired, counted, tied
                     state.stopped = tolerance > 0 and 0 <= last - total < tolerance * total
                     a, b = b, a
                     turned = not turned
