@@ -66,7 +66,10 @@ class OkutomiKanade:
 
 @helper
 def _keep_minimum(cost, terms, plane, previous, best, before, after, place):  # type: ignore[no-untyped-def]
-    """Take plane number `plane` into the running minimum and its two neighbours, all (X,)."""
+    """Take the costs of plane number `plane` into the running minimum and its two neighbours, all (X,).
+
+    `previous` holds the plane before; `before` and `after` are the costs beside the minimum, `place` is its plane.
+    """
     for x in range(cost.size):
         mean = cost[x] / terms[x] if terms[x] > 0 else np.float32(np.inf)
         lower = mean < best[x]

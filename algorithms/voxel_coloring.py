@@ -90,7 +90,7 @@ class VoxelColoring:
 
 @helper
 def _add_unmarked(unmarked, red, green, blue, number, reds, greens, blues):  # type: ignore[no-untyped-def]
-    """Add a view's unmarked samples to their number and their colours to the sums, all (S,)."""
+    """Count a view's unmarked samples in `number` and add their colours to the sums, all (S,)."""
     for x in range(unmarked.size):
         weight = unmarked[x]
         number[x] += weight
@@ -109,7 +109,7 @@ def _add_deviations(unmarked, red, green, blue, reds, greens, blues, squares):  
 
 @helper
 def _to_mean(number, reds, greens, blues, freedom):  # type: ignore[no-untyped-def]
-    """Turn sums into means and tell the degrees of freedom, 3 * (number - 1) or 0, all (columns,)."""
+    """Turn sums of colours into means; freedom = 3 * (number - 1), or 0 without samples, all (columns,)."""
     for x in range(number.size):
         some = max(number[x], np.float32(1))
         reds[x] /= some

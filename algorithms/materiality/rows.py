@@ -1,4 +1,4 @@
-"""Descent of the energy where nothing couples rows: all passes over one while it is in the cache, then the next."""
+"""Descent of the energy where nothing couples rows: all passes over one row while it is in the cache, then the next."""
 
 import numpy as np
 
@@ -7,7 +7,8 @@ from matbench.algorithms.materiality.passes import Data, Point, Ties, pass_rows
 
 RISE = 1e-6  # but at a restart, an energy exceeds that of the pass before by at most this share
 
-# of one row: the parts of its energy after the last accepted pass, how the next pass goes on, passes made
+# the state of one row: the parts of its energy at the last accepted pass; momentum, beta and step of the next pass;
+# whether it has stopped, and how many passes it has made
 ROW = np.dtype([(name, np.float64) for name in ("data", "count", "adjacent", "momentum", "beta", "step")] + [
     ("stopped", np.int64), ("made", np.int64),
 ])  # fmt: skip
@@ -15,15 +16,24 @@ ROW = np.dtype([(name, np.float64) for name in ("data", "count", "adjacent", "mo
 
 @kernel
 def follow(total, last, momentum, beta, step, accelerated):  # type: ignore[no-untyped-def]
-    """What follows a pass whose energy is `total`, if that of the last accepted pass is `last`.
+    """Whether a pass is accepted, and how the next one goes on.
 
-    A rise beyond rounding rejects a pass with momentum, and the next one goes without; without
-    momentum it halves the step, and energies are compared anew.
+    If the energy rises by more than rounding, a pass with momentum is rejected and the next one has none. A pass
+    without momentum is accepted all the same, but the step is halved, and energies are compared anew from there.
+
+    Parameters
+    ----------
+    total, last
+        Energies of this pass and of the last accepted one.
+    momentum, beta, step
+        Of this pass.
+    accelerated
+        As in `Descent`.
 
     Returns
     -------
     accepted, restart
-        Whether the pass counts, and whether it is one from which on energies are compared anew.
+        Whether the pass counts, and whether energies are compared anew from it on.
     momentum, beta, step
         Of the next pass; see `Descent`.
     """
