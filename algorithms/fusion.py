@@ -11,7 +11,8 @@ from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.similarity import FULL, Matcher
 from matbench.algorithms.windows import Features
 
-# what is assumed of a point before any view is asked: it weighs as half a view would, a tenth of whose rays end there
+# What is assumed of a point before any view or pair is asked. It weighs as half of one; a tenth of its rays end there.
+# Without it, one view alone would be as certain as all that agree, and a point that none sees would be 0 / 0.
 PRIOR, ENDED = 0.5, 0.05
 
 
@@ -25,7 +26,7 @@ def _exchange(high, low):  # type: ignore[no-untyped-def]
 
 @helper
 def _sum_first(part, place, taken, total):  # type: ignore[no-untyped-def]
-    """Adds the number of rank `place` in the columns that take more than so many."""
+    """Adds the number of rank `place`, counted from 0, in the columns that take more than `place` numbers."""
     zero = np.float32(0)
     for x in range(total.size):
         total[x] += np.float32(part[x]) if place < taken[x] else zero
@@ -33,9 +34,9 @@ def _sum_first(part, place, taken, total):  # type: ignore[no-untyped-def]
 
 @kernel
 def better_half(rho, low, high, hidden, cost):  # type: ignore[no-untyped-def]
-    """1 - the mean of the better half, rounded up, of the similarities with both frusta; else `hidden`.
+    """1 - the mean of the better half, rounded up, of the similarities of the pairs that hold a point in both frusta.
 
-    Where half of the views cannot see a point, the other half still can.
+    It is `hidden` where no pair does. If half of the views cannot see a point, the other half still can.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def better_half(rho, low, high, hidden, cost):  # type: ignore[no-untyped-def]
         for y in range(rho.shape[0]):
             for p in range(count):
                 for x in range(columns):
-                    best[p, x] = rho[y, p, k, x]
+                    best[p, x] = rho[y, p, k, x]  # 0 beyond a frustum, and so sorted behind what counts
             total = cost[y, k]
             total[:] = 0
             for place in range((count + 1) // 2):  # sorts no further than the sum needs
@@ -73,7 +74,10 @@ def better_half(rho, low, high, hidden, cost):  # type: ignore[no-untyped-def]
 
 @helper
 def _sight(found, k, through, ended, reached):  # type: ignore[no-untyped-def]
-    """V = k + 2 - d and w = 1 - |k - d|, within 0 and 1, of rays that end in the planes d = `found`."""
+    """through = V, reached += V and ended += w at plane k, for rays that end in the planes d = `found`.
+
+    V = k + 2 - d and w = 1 - |k - d|, both kept within 0 and 1.
+    """
     zero, one, two, plane = np.float32(0), np.float32(1), np.float32(2), np.float32(k)
     for x in range(found.size):
         behind = plane - found[x]
@@ -123,6 +127,7 @@ def weigh_seen(rho, pairs, maps, view, spans, y0, fineness, hidden, cost, materi
                 fill(one if j == view else zero, through[j])
                 low, count = spans[j, k, 0], spans[j, k, 1]
                 if j != view and count > 0:
+                    # a map has one value a pixel: between two pixels the nearer one is asked
                     start = spans[j, k, 5] + (1 if 2 * spans[j, k, 4] > fineness else 0)
                     _sight(
                         maps[j, y0 + y, start : start + count],

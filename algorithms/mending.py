@@ -16,8 +16,9 @@ COLOUR, DISTANCE = 8.0, 9.0  # grey levels and pixels over which their votes fal
 def count_votes(maps, view, tolerance, top, end, agreeing, contradicting):  # type: ignore[no-untyped-def]
     """How many other views agree with each pixel of a view, and how many contradict it.
 
-    A view j agrees if its disparity, where it should see the point, is the same within `tolerance`;
-    it contradicts if it sees farther, through the point. A view that sees nearer says nothing.
+    View j agrees if its disparity at the column where it should see the point is the same within `tolerance`.
+    It contradicts if it sees something farther there, through the point. If it sees something nearer, the point is
+    hidden from it, and it says nothing.
 
     Parameters
     ----------
@@ -31,7 +32,7 @@ def count_votes(maps, view, tolerance, top, end, agreeing, contradicting):  # ty
         for x in range(width):
             here = maps[view, y, x]
             agreed, contradicted = 0, 0
-            if here == here:
+            if here == here:  # not NaN
                 for j in range(views):
                     at = np.int64(np.floor(x - (j - view) * here + np.float32(0.5)))
                     if j != view and 0 <= at < width:
@@ -45,12 +46,13 @@ def count_votes(maps, view, tolerance, top, end, agreeing, contradicting):  # ty
 
 
 @kernel
-def vote(found, image, asked, trusted, colour, distance, least, step, top, end, out):  # type: ignore[no-untyped-def]
-    """Weighted median of the trusted neighbours of every pixel that is asked about.
+def vote(found, image, doubtful, trusted, colour, distance, least, step, top, end, out):  # type: ignore[no-untyped-def]
+    """Weighted median of the trusted neighbours of every doubtful pixel.
 
     Neighbours weigh exp(-|dI| / COLOUR - (|dx| + |dy|) / DISTANCE), with |dI| the largest difference
-    over the colours. The median is that of classes `step` wide from `least` on, and no more than
-    what was found; a pixel that is within a class of it, or without trusted neighbours, keeps its own.
+    over the colours. Votes are counted in classes `step` wide from `least` on, and the median is the middle of a
+    class, or the largest disparity found if that is less. A pixel within one step of the median, or
+    without trusted neighbours, keeps its own disparity.
 
     Parameters
     ----------
@@ -58,10 +60,14 @@ def vote(found, image, asked, trusted, colour, distance, least, step, top, end, 
         (H, W) float32 disparities, NaN = none.
     image
         (H, W, 3) uint8.
-    asked, trusted
-        (H, W) bool.
+    doubtful, trusted
+        (H, W) bool: the pixels to mend, and those that may vote.
     colour, distance
-        (256,) and (REACH + 1,) float32 factors of the weight.
+        (256,) and (REACH + 1,) float32: the weight's factors, by |dI| and by |dx| or |dy|.
+    least, step
+        Pixels per view step.
+    out
+        (H, W) float32, of which the rows top..end are overwritten.
     """
     height, width = found.shape
     reach = distance.size - 1
@@ -70,7 +76,7 @@ def vote(found, image, asked, trusted, colour, distance, least, step, top, end, 
     for y in range(top, end):
         for x in range(width):
             out[y, x] = found[y, x]
-            if not asked[y, x]:
+            if not doubtful[y, x]:
                 continue
             votes[:] = 0
             total = np.float32(0)
@@ -89,7 +95,7 @@ def vote(found, image, asked, trusted, colour, distance, least, step, top, end, 
                     place += 1
                     passed += votes[place]
                 median = min(least + (place + np.float32(0.5)) * step, most)
-                if not abs(found[y, x] - median) <= step:
+                if not abs(found[y, x] - median) <= step:  # NaN, too, is replaced
                     out[y, x] = median
 
 
@@ -98,10 +104,10 @@ def mend(
 ) -> NDArray[np.float32]:
     """(views, H, W) maps that agree better with one another, without NaN but for a view that is all NaN.
 
-    In every round, for every view: a pixel is doubtful if it has less than TRUST times as many views
-    that agree with it as contradict it (`count_votes`), or no answer; in the first round it loses its answer
-    where fewer agree than contradict. Doubtful pixels take the weighted median of their trusted
-    neighbours (`vote`), and holes without any are filled from the background. A view without
+    In every round and view, a pixel is trusted if it has an answer, and at least TRUST times as many views agree with
+    it as contradict it (`count_votes`). All others are doubtful; in the first round those that more views
+    contradict than agree with lose their answer. Doubtful pixels take the weighted median of their trusted
+    neighbours (`vote`). Holes without such neighbours are filled from the background. A view without
     any trusted pixel is left as it is.
 
     Parameters
@@ -111,7 +117,7 @@ def mend(
     images
         (views, H, W, 3) uint8.
     pixel
-        One pixel of the field's pair, in pixels per view step: what maps may differ by.
+        One pixel of the field's pair, in pixels per view step: maps that differ by no more agree.
     rounds
         How often; 0 only fills holes.
     """

@@ -2,9 +2,9 @@
 
 import numpy as np
 from attrs import field, frozen
-from numba import njit
 
 from matbench.algorithm import Context, Estimate
+from matbench.algorithms.kernels import add, helper, kernel, literal
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
 from matbench.algorithms.sampling import by_phase, fine_rows, search_space
@@ -64,16 +64,12 @@ class OkutomiKanade:
         return Estimate({scene.ref: disparity}, work={"ssd_evaluations": sum(evaluations)})
 
 
-@njit(nogil=True, cache=True)
-def _add(values, out):  # type: ignore[no-untyped-def]
-    """out[x] <- out[x] + values[x]."""
-    for x in range(out.size):
-        out[x] += values[x]
-
-
-@njit(nogil=True, cache=True)
+@helper
 def _keep_minimum(cost, terms, plane, previous, best, before, after, place):  # type: ignore[no-untyped-def]
-    """Take plane number `plane` into the running minimum and its two neighbours, all (X,)."""
+    """Take the costs of plane number `plane` into the running minimum and its two neighbours, all (X,).
+
+    `previous` holds the plane before; `before` and `after` are the costs beside the minimum, `place` is its plane.
+    """
     for x in range(cost.size):
         mean = cost[x] / terms[x] if terms[x] > 0 else np.float32(np.inf)
         lower = mean < best[x]
@@ -85,7 +81,7 @@ def _keep_minimum(cost, terms, plane, previous, best, before, after, place):  # 
         previous[x] = mean
 
 
-@njit(nogil=True, cache=True)
+@literal
 def _refine(place, best, before, after, first, out):  # type: ignore[no-untyped-def]
     """out <- plane of the minimum, moved to the vertex of the parabola through it and its neighbours."""
     for x in range(out.size):
@@ -99,7 +95,7 @@ def _refine(place, best, before, after, first, out):  # type: ignore[no-untyped-
         out[x] = np.float32(first) + place[x] + offset
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def sssd_minimum(phases, ref, first, planes, radius, top, rows):  # type: ignore[no-untyped-def]
     """Plane of the smallest SSSD for a block of rows, refined by a parabola.
 
@@ -156,9 +152,9 @@ def sssd_minimum(phases, ref, first, planes, radius, top, rows):  # type: ignore
                 inside = column[radius + seen : radius + end]
                 inside[:] = 0
                 for near in range(max(0, top + y - radius), min(height, top + y + radius + 1)):
-                    _add(squares[near, seen:end], inside)
+                    add(squares[near, seen:end], inside)
                 for tap in range(2 * radius + 1):
-                    _add(column[left + tap : right + tap], cost[y, left:right])
+                    add(column[left + tap : right + tap], cost[y, left:right])
             terms[left:right] += np.float32(1)
             evaluations += rows * (right - left)
         for y in range(rows):

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 
 def share(rows: int, threads: int) -> int:
-    """Rows a call where a call costs more than a few rows: eight calls a thread balance the load."""
+    """Rows a call, where a call costs as much as some rows: eight calls a thread still balance the load."""
     return max(1, -(-rows // (8 * max(1, threads))))
 
 

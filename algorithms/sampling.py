@@ -50,7 +50,7 @@ def fine_rows(images: NDArray[np.uint8], fineness: int) -> NDArray[np.float32]:
 
 
 def by_phase(values: NDArray[np.generic], fineness: int) -> NDArray[np.generic]:
-    """Sort finely sampled rows by their phase within a pixel, so that shifted reads are contiguous.
+    """Sort finely sampled rows by their phase within a pixel, so that samples a pixel apart lie side by side.
 
     Parameters
     ----------

@@ -92,8 +92,8 @@ class SGBM:
 
         OpenCV answers only where the whole range stays inside the right image. Both images are
         therefore continued beyond their sides by repeating the edge, so that every pixel is tried.
-        Nor does it refuse or repeat itself reliably where fewer columns than half a block are left
-        to answer for; images narrower than a block are made as wide.
+        Where fewer columns than half a block are left to answer for, OpenCV's answer varies from call to
+        call; images narrower than a block are therefore made as wide as one.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Similarities rho_ij of windows in pairs of views, over all target points (docs/concepts/methods.md)."""
+"""Similarities rho_ij of windows in pairs of views, at all target points (docs/concepts/methods.md)."""
 
 from collections.abc import Mapping
 from itertools import combinations, pairwise
@@ -164,7 +164,7 @@ class Matcher:
 
     @property
     def comparisons(self) -> int:
-        """How many pairs of windows `all` compares: target points in both frusta, summed over pairs."""
+        """How many pairs of windows `all` compares: target points in both frusta, summed over the pairs of views."""
         return self.space.rows * sum(int(self.spans(i, j)[:, 1].sum()) for i, j in self.pairs)
 
     @property
@@ -178,10 +178,10 @@ class Matcher:
         return 4 * self.space.rows * self.space.width * self.space.planes
 
     def spans(self, i: int, j: int) -> NDArray[np.int64]:
-        """(planes, 6) where the points of each plane lie that both views see.
+        """(planes, 6) for each plane, where in a volume the points lie that are in the frusta of both views.
 
-        First column of a volume and number of columns, then phase and column where they start in
-        view i, then in view j; the phase is 0, as all samples are counted.
+        Their first column and how many columns they are; then phase and sample of the first of them in view i,
+        and the same in view j. The phase is always 0 here: samples are not sorted by it.
         """
         space = self.space
         plane = np.arange(space.first, space.last + 1)
@@ -192,9 +192,9 @@ class Matcher:
         return np.stack([low, width, none, low - starts[0], none, low - starts[1]], axis=1)
 
     def ray_spans(self, i: int, j: int) -> NDArray[np.int64]:
-        """The same for points on the pixel rays of the reference view: columns are its pixels.
+        """The same for points on the pixel rays of the reference view; columns are its pixels.
 
-        Samples of the views are counted in whole pixels from their phase on.
+        Samples are sorted by phase (`phases`), and counted among those of one phase.
         """
         space, q = self.space, self.space.fineness
         plane = np.arange(space.first, space.last + 1)

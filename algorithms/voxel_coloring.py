@@ -4,10 +4,10 @@ from functools import partial
 
 import numpy as np
 from attrs import field, frozen, validators
-from numba import njit
 
 from matbench.algorithm import Context, Estimate
 from matbench.algorithms.holes import fill_from_background
+from matbench.algorithms.kernels import add, helper, kernel, literal
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
 from matbench.algorithms.sampling import fine_rows, search_space
@@ -88,9 +88,9 @@ class VoxelColoring:
         )
 
 
-@njit(nogil=True, cache=True)
+@helper
 def _add_unmarked(unmarked, red, green, blue, number, reds, greens, blues):  # type: ignore[no-untyped-def]
-    """Add a view's unmarked samples to their number and their colours to the sums, all (S,)."""
+    """Count a view's unmarked samples in `number` and add their colours to the sums, all (S,)."""
     for x in range(unmarked.size):
         weight = unmarked[x]
         number[x] += weight
@@ -99,7 +99,7 @@ def _add_unmarked(unmarked, red, green, blue, number, reds, greens, blues):  # t
         blues[x] += weight * blue[x]
 
 
-@njit(nogil=True, cache=True)
+@literal
 def _add_deviations(unmarked, red, green, blue, reds, greens, blues, squares):  # type: ignore[no-untyped-def]
     """Add a view's squared deviations from the mean colours to squares, all (S,)."""
     for x in range(unmarked.size):
@@ -107,9 +107,9 @@ def _add_deviations(unmarked, red, green, blue, reds, greens, blues, squares):  
         squares[x] += unmarked[x] * (r * r + g * g + b * b)
 
 
-@njit(nogil=True, cache=True)
+@helper
 def _to_mean(number, reds, greens, blues, freedom):  # type: ignore[no-untyped-def]
-    """Turn sums into means and tell the degrees of freedom, 3 * (number - 1) or 0, all (columns,)."""
+    """Turn sums of colours into means; freedom = 3 * (number - 1), or 0 without samples, all (columns,)."""
     for x in range(number.size):
         some = max(number[x], np.float32(1))
         reds[x] /= some
@@ -118,21 +118,14 @@ def _to_mean(number, reds, greens, blues, freedom):  # type: ignore[no-untyped-d
         freedom[x] = np.float32(3) * (some - np.float32(1))
 
 
-@njit(nogil=True, cache=True)
-def _add(values, out):  # type: ignore[no-untyped-def]
-    """out[x] <- out[x] + values[x]."""
-    for x in range(out.size):
-        out[x] += values[x]
-
-
-@njit(nogil=True, cache=True)
+@helper
 def _mark(occupied, unmarked):  # type: ignore[no-untyped-def]
     """unmarked[x] <- 0 where occupied, both (S,)."""
     for x in range(unmarked.size):
         unmarked[x] *= np.float32(1) - occupied[x]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def pool_rows(images, unmarked, starts, radius, fineness, sums, first, end):  # type: ignore[no-untyped-def]
     """Views, squared deviations and degrees of freedom of one plane's voxels, for a block of rows.
 
@@ -175,11 +168,11 @@ def pool_rows(images, unmarked, starts, radius, fineness, sums, first, end):  # 
         for tap in range(-reach, reach + 1, fineness):
             a, b = max(0, -tap), min(columns, columns - tap)
             if a < b:
-                _add(squares[a + tap : b + tap], sums[1, y, a:b])
-                _add(freedom[a + tap : b + tap], sums[2, y, a:b])
+                add(squares[a + tap : b + tap], sums[1, y, a:b])
+                add(freedom[a + tap : b + tap], sums[2, y, a:b])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def colour_rows(sums, starts, radius, variance, unmarked, occupied, tested, first, end):  # type: ignore[no-untyped-def]
     """Colour one plane's consistent voxels and mark their pixels, for a block of rows.
 
@@ -203,8 +196,8 @@ def colour_rows(sums, starts, radius, variance, unmarked, occupied, tested, firs
     for y in range(first, end):
         squares[:], freedom[:] = 0, 0
         for near in range(max(0, y - radius), min(height, y + radius + 1)):
-            _add(sums[1, near], squares)
-            _add(sums[2, near], freedom)
+            add(sums[1, near], squares)
+            add(sums[2, near], freedom)
         for x in range(columns):
             if sums[0, y, x] >= 2:
                 tested[y] += 1

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from matbench.datasets.pair import CALIBRATION, pair
-from matbench.datasets.stored import StoredScene, TruthFile, inside
+from matbench.datasets.stored import StoredScene, TruthFile, check_options, inside
 from matbench.errors import UserError, one_line, unknown
 from matbench.files.images import encoding, read_bytes
 from matbench.scene import Range, Scene
@@ -48,7 +48,9 @@ class Folder:
 
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:  # noqa: ARG002
         """Load the scene in the folder `name`; options are `stored.OPTIONS`."""
-        return describe(name).load(options)
+        found = describe(name)
+        check_options(name, options)
+        return found.load(options)
 
 
 def describe(called: str) -> StoredScene:
@@ -92,7 +94,7 @@ def read(called: str, folder: Path) -> StoredScene:
         disparities=_disparities(path, found.get("disparities")),
         truth=_truth(path, folder, names, found.get("truth", {})),
         pair_steps=steps,
-        reference=None if reference is None else _view(path, names, reference, "reference"),
+        preferred=() if reference is None else (_view(path, names, reference, "reference"),),
     )
 
 

@@ -14,7 +14,7 @@ from configparser import ConfigParser
 from configparser import Error as ConfigError
 from pathlib import Path
 
-from matbench.datasets.stored import StoredScene, TruthFile
+from matbench.datasets.stored import StoredScene, TruthFile, check_options
 from matbench.errors import UserError, one_line, unknown
 from matbench.files.images import read_bytes
 from matbench.scene import Range, Scene
@@ -70,6 +70,7 @@ class HCI:
         to score, by their number in it; `disparities` to search.
         """
         called = f"hci/{name}"
+        check_options(called, options, ("column", "row"))
         folders = _folders(root)
         if name not in _CATEGORY and name not in folders:
             raise unknown("scene of hci", name, {*_CATEGORY, *folders})
@@ -92,7 +93,7 @@ class HCI:
             truth=truth,
             column="column" in options,
         )
-        return stored.load(options, ("column", "row"))
+        return stored.load(options)
 
 
 def _image(place: int) -> str:

@@ -18,8 +18,8 @@ from math import ceil
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from matbench.datasets.middlebury import ROUND_UP
 from matbench.datasets.registry import REGISTRY, YEARS, Layout, registry
+from matbench.datasets.stored import ROUND_UP
 from matbench.errors import UserError
 
 DIGITS = 4  # of a disparity in a manifest, before it is taken for a whole number of grey levels

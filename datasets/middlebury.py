@@ -9,41 +9,20 @@ Scharstein & Pal, CVPR 2007, and Hirschmueller & Scharstein, CVPR 2007 (2005, 20
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from math import ceil
 from pathlib import Path, PurePosixPath
 
-import numpy as np
 from attrs import frozen
-from numpy.typing import NDArray
 
-from matbench import spec
-from matbench.datasets.choose import search_range, views_and_reference
 from matbench.datasets.registry import YEARS, Facts, Layout, Registry, registry, site
+from matbench.datasets.stored import EXTENSIONS, StoredScene, TruthFile, check_options, image_file
 from matbench.errors import UserError, unknown
-from matbench.files.images import has_pixels, read_grey, read_rgb, read_size
-from matbench.regions import regions
+from matbench.files.images import has_pixels, read_size
 from matbench.scene import Range, Scene
 from matbench.scenes.dataset import Download, Listing, Remote
 
-OPTIONS = ("baseline", "disparities", "ref", "size", "views")
-ROUND_UP = 16  # px of the pair, for ranges that come from the truth itself
-
-_EXTENSIONS = (".png", ".ppm", ".pgm")
 _PREFIXES = ("im", "view")
-
-
-def _find(folder: Path, stem: str) -> Path | None:
-    """The image file of that name, whatever its format."""
-    return next((path for end in _EXTENSIONS if (path := folder / f"{stem}{end}").is_file()), None)
-
-
-def _found(folder: Path, stem: str) -> Path:
-    path = _find(folder, stem)
-    if path is None:
-        raise UserError(f"image {folder / stem} is missing ({' or '.join(_EXTENSIONS)})")
-    return path
 
 
 @frozen
@@ -84,8 +63,9 @@ class Middlebury:
     def _is_complete(self, root: Path, name: str, size: str) -> bool:
         """Can it be loaded, with all views, and scored if it is known to have truth?"""
         folder, layout = self._folder(root, name, size), self._layout(name, size)
-        return all(_find(folder, layout.view.format(k)) for k in layout.numbers) and (
-            self._lacks_truth(name, size) or any(_find(folder, layout.truth.format(k)) for k in layout.with_truth)
+        return all(image_file(folder, layout.view.format(k)).is_file() for k in layout.numbers) and (
+            self._lacks_truth(name, size)
+            or any(image_file(folder, layout.truth.format(k)).is_file() for k in layout.with_truth)
         )
 
     def _lacks_truth(self, name: str, size: str) -> bool:
@@ -112,10 +92,8 @@ class Middlebury:
                     file,
                     count,
                     sha256,
-                    also=tuple(f"{Path(file).stem}{end}" for end in _EXTENSIONS if not file.endswith(end)),
-                    offered_as=tuple(
-                        f"{alias[stem]}{end}" for end in _EXTENSIONS if (stem := Path(file).stem) in alias
-                    ),
+                    also=tuple(f"{Path(file).stem}{end}" for end in EXTENSIONS if not file.endswith(end)),
+                    offered_as=tuple(f"{alias[stem]}{end}" for end in EXTENSIONS if (stem := Path(file).stem) in alias),
                     holds=partial(has_pixels, digest=pixels),
                 )
                 for file, (count, sha256, pixels) in facts.files.items()
@@ -127,64 +105,29 @@ class Middlebury:
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:
         """Load a scene; options are `size`, `views`, `baseline`, `ref` and `disparities`.
 
-        Only the chosen views are read, and the truth of every view that has it.
+        Only the chosen views are read, and their truth.
         """
         called = f"middlebury{self.year}/{name}"
-        for option in options:
-            if option not in OPTIONS:
-                raise unknown(f"option of {called}", option, (*OPTIONS, "predict"))
+        check_options(called, options, ("size",))
         folder, size = self._locate(called, name, options.get("size"), root)
         layout, facts = self._layout(name, size), self.known.scenes.get(name, {}).get(size)
-        labels = [layout.label.format(number) for number in layout.numbers]
-        searched = search_range(called, options.get("disparities"), layout.steps)
-        have = [number for number in layout.with_truth if _find(folder, layout.truth.format(number))]
-        if not have and not self._lacks_truth(name, size):
+        index = {number: place for place, number in enumerate(layout.numbers)}
+        files = {index[number]: image_file(folder, layout.truth.format(number)) for number in layout.with_truth}
+        scale = layout.grey * layout.steps
+        truth = {view: TruthFile(file, scale, layout.unknown) for view, file in files.items() if file.is_file()}
+        if not truth and not self._lacks_truth(name, size):
             raise UserError(f"{called} has no ground truth in {folder}: a scene without it cannot be scored")
-        indices = [layout.numbers.index(number) for number in have]
-        preferred = indices or sorted(range(len(labels)), key=lambda i: layout.numbers[i] != layout.pair[0])
-        chosen, ref = views_and_reference(called, labels, preferred, options, _PREFIXES)
-
-        images = {ref: read_rgb(_found(folder, layout.view.format(layout.numbers[ref])))}
-        height, width = images[ref].shape[:2]
-        for index in chosen:
-            if index != ref:
-                images[index] = read_rgb(_found(folder, layout.view.format(layout.numbers[index])), (width, height))
-        truth = {index: self._truth(folder, layout, layout.numbers[index], (width, height)) for index in indices}
-        views = np.zeros((len(labels), height, width, 3), np.uint8)  # those not chosen are dropped below
-        for index, image in images.items():
-            views[index] = image
-        other = layout.steps if layout.numbers[ref] == layout.pair[0] else -layout.steps
-        full = Scene(
-            name=spec.label(called, dict(sorted(options.items()))),
-            views=views,
-            labels=tuple(labels),
-            ref=ref,
-            disparities=searched
-            or Range(0, (facts.largest if facts else self._largest(layout, truth.values())) / layout.steps),
+        largest = facts.largest if facts else layout.largest
+        return StoredScene(
+            called=called,
+            views=tuple(image_file(folder, layout.view.format(number)) for number in layout.numbers),
+            labels=tuple(layout.label.format(number) for number in layout.numbers),
+            disparities=None if largest is None else Range(0, largest / layout.steps),
             truth=truth,
             pair_steps=layout.steps,
-            regions=regions(images[ref], truth[ref], other) if truth else {},
-        )
-        return full if len(chosen) == len(labels) else full.choose(chosen)
-
-    def _truth(self, folder: Path, layout: Layout, number: int, size: tuple[int, int]) -> NDArray[np.float32]:
-        """(H, W) float32, px per view step, NaN where unknown."""
-        path = _found(folder, layout.truth.format(number))
-        grey = read_grey(path, size)
-        truth = grey.astype(np.float32) / np.float32(layout.grey * layout.steps)
-        if layout.unknown is not None:
-            truth[grey == layout.unknown] = np.nan
-        if np.isnan(truth).all():
-            raise UserError(f"ground truth {path} is unknown everywhere: it must hold grey levels above 0")
-        return truth
-
-    @staticmethod
-    def _largest(layout: Layout, truths: Iterable[NDArray[np.float32]]) -> float:
-        """Largest disparity to search, px of the pair."""
-        if layout.largest is not None:
-            return layout.largest
-        nearest = max(float(np.nanmax(truth)) for truth in truths) * layout.steps
-        return max(1, ceil(nearest / ROUND_UP - 1e-6)) * ROUND_UP
+            preferred=tuple(truth) or tuple(sorted(index.values(), key=lambda view: view != index[layout.pair[0]])),
+            prefixes=_PREFIXES,
+        ).load(options)
 
     def _locate(self, called: str, name: str, size: str | None, root: Path | None) -> tuple[Path, str]:
         """The folder of a scene and its size.
@@ -227,7 +170,7 @@ class Middlebury:
     def _is_present(self, name: str, size: str, root: Path) -> bool:
         """Does the folder hold any view of that layout?"""
         folder, layout = self._folder(root, name, size), self._layout(name, size)
-        return any(_find(folder, layout.view.format(number)) for number in layout.numbers)
+        return any(image_file(folder, layout.view.format(number)).is_file() for number in layout.numbers)
 
     def _sizes_present(self, name: str, root: Path | None) -> list[str]:
         """The sizes of a scene of that checked name, in order of preference."""
@@ -252,9 +195,9 @@ class Middlebury:
         if root is None:
             return 0, 0
         folder, layout = self._folder(root, name, size), self._layout(name, size)
-        paths = (_find(folder, layout.view.format(number)) for number in layout.numbers)
+        paths = (image_file(folder, layout.view.format(number)) for number in layout.numbers)
         try:
-            return read_size(next(path for path in paths if path))
+            return read_size(next(path for path in paths if path.is_file()))
         except (UserError, StopIteration):
             return 0, 0
 

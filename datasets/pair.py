@@ -10,7 +10,7 @@ Reference: Scharstein et al., GCPR 2014; https://vision.middlebury.edu/stereo/da
 import re
 from pathlib import Path
 
-from matbench.datasets.stored import StoredScene, TruthFile, inside
+from matbench.datasets.stored import StoredScene, TruthFile, image_file, inside
 from matbench.errors import UserError
 from matbench.files.images import read_bytes
 from matbench.scene import Range
@@ -34,13 +34,8 @@ def pair(called: str, folder: Path) -> StoredScene:
     size = (_whole(path, facts, "width"), _whole(path, facts, "height")) if "width" in facts else None
     maps = {view: f"disp{view}.pfm" for view in (0, 1)}
     truth = {view: TruthFile(inside(folder, name)) for view, name in maps.items() if (folder / name).is_file()}
-    views = tuple(_view(folder, view) for view in (0, 1))
+    views = tuple(inside(folder, image_file(folder, f"im{view}").name) for view in (0, 1))
     return StoredScene(called, views, ("0", "1"), Range(0, count - 1), truth, size=size)
-
-
-def _view(folder: Path, view: int) -> Path:
-    names = [f"im{view}{end}" for end in (".png", ".ppm", ".pgm")]
-    return inside(folder, next((name for name in names if (folder / name).is_file()), names[0]))
 
 
 def _facts(path: Path) -> dict[str, str]:

@@ -1,8 +1,9 @@
 """Scenes kept as files: which images are its views, and what its truth files mean."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,33 @@ from matbench.regions import regions
 from matbench.scene import Range, Scene
 
 OPTIONS = ("baseline", "disparities", "ref", "views")
+EXTENSIONS = (".png", ".ppm", ".pgm")
+ROUND_UP = 16  # px of the pair, for ranges that come from the truth itself
+
+
+def check_options(called: str, options: Iterable[str], own: Sequence[str] = ()) -> None:
+    """Refuse options that a scene does not have.
+
+    Parameters
+    ----------
+    own
+        Names of the options that the dataset has besides `OPTIONS`.
+
+    Raises
+    ------
+    UserError
+        If one of them is unknown.
+    """
+    known = sorted((*OPTIONS, *own))
+    for option in options:
+        if option not in known:
+            raise unknown(f"option of {called}", option, (*known, "predict"))
+
+
+def image_file(folder: Path, stem: str) -> Path:
+    """The image of that name in a folder, whatever its format; a PNG where there is none."""
+    files = [folder / f"{stem}{end}" for end in EXTENSIONS]
+    return next((file for file in files if file.is_file()), files[0])
 
 
 def inside(folder: Path, name: str) -> Path:
@@ -91,15 +119,19 @@ class StoredScene:
     views, labels
         Files from left to right, and what each is called; labels end in numbers that increase.
     disparities
-        The range to search, pixels per view step.
+        The range to search, pixels per view step. If None, it is from 0 to the nearest truth of any view, rounded
+        up to a multiple of `ROUND_UP` pixels of the pair.
     truth
         View index -> its file.
     pair_steps
         View steps between the two views of the pair.
     size
         (width, height), where that is known beforehand.
-    reference
-        Index of the view that is scored if nothing else is asked for.
+    preferred
+        Indices of the views to score rather than others, the best first. The others follow from the middle
+        outwards, those with truth if any has.
+    prefixes
+        What may stand before a view's number where an option names it, as in ``views=im2+im6``.
     column
         The views were taken one below the other: all is turned by a quarter, counter-clockwise,
         so that they lie from left to right.
@@ -108,39 +140,37 @@ class StoredScene:
     called: str
     views: tuple[Path, ...]
     labels: tuple[str, ...]
-    disparities: Range
+    disparities: Range | None
     truth: Mapping[int, TruthFile] = field(factory=dict)
     pair_steps: int = 1
     size: tuple[int, int] | None = None
-    reference: int | None = None
+    preferred: tuple[int, ...] = ()
+    prefixes: tuple[str, ...] = ()
     column: bool = False
 
-    def load(self, options: Mapping[str, str], own: tuple[str, ...] = ()) -> Scene:
-        """Read the scene.
+    def load(self, options: Mapping[str, str]) -> Scene:
+        """Read the chosen views and their truth.
 
         Parameters
         ----------
         options
-            `OPTIONS`, and those of the dataset.
-        own
-            Names of the latter, already heeded.
+            `OPTIONS`; others belong to the dataset and are only named.
 
         Raises
         ------
         UserError
-            For an unknown option or value, and for missing or damaged files.
+            For a value that an option does not take, and for missing or damaged files.
         """
-        for option in options:
-            if option not in (*OPTIONS, *own):
-                raise unknown(f"option of {self.called}", option, (*OPTIONS, *own, "predict"))
-        chosen, ref = views_and_reference(self.called, self.labels, self._preferred(), options)
+        chosen, ref = views_and_reference(self.called, self.labels, self._scorable(), options, self.prefixes)
         searched = search_range(self.called, options.get("disparities"), self.pair_steps)
         partner = self._partner(ref)
 
         images = {ref: read_rgb(self.views[ref], self.size)}
         height, width = images[ref].shape[:2]
         images |= {index: read_rgb(self.views[index], (width, height)) for index in chosen if index != ref}
-        truth = {view: file.read((width, height)) for view, file in self.truth.items() if view in images}
+        kept = {view: file for view, file in self.truth.items() if view in images or self.disparities is None}
+        truth = {view: file.read((width, height)) for view, file in kept.items()}
+        known = self.disparities or self._range_of(truth.values())
         if self.column:
             # column y of what is turned is row y of the picture: where nearer points move up from one
             # view to the next below it, they then move left
@@ -155,18 +185,23 @@ class StoredScene:
             views=views,
             labels=self.labels,
             ref=ref,
-            disparities=searched or self.disparities,
+            disparities=searched or known,
             truth=truth,
             pair_steps=self.pair_steps,
             regions=regions(images[ref], truth[ref], partner) if ref in truth else {},
         )
         return full if len(chosen) == len(self.labels) else full.choose(chosen)
 
-    def _preferred(self) -> list[int]:
-        """Views that may be scored, the best first: those with truth, from the middle; without any, all."""
+    def _scorable(self) -> list[int]:
+        """Indices of the views that may be scored, the best first; see `preferred`."""
         middle = (len(self.views) - 1) / 2
-        able = sorted(self.truth or range(len(self.views)), key=lambda view: (abs(view - middle), view))
-        return able if self.reference is None else [self.reference, *(v for v in able if v != self.reference)]
+        others = set(self.truth or range(len(self.views))) - set(self.preferred)
+        return [*self.preferred, *sorted(others, key=lambda view: (abs(view - middle), view))]
+
+    def _range_of(self, truths: Iterable[NDArray[np.float32]]) -> Range:
+        """0 to the nearest truth, rounded up; see `disparities`."""
+        nearest = max(float(np.nanmax(truth)) for truth in truths) * self.pair_steps
+        return Range(0, max(1, ceil(nearest / ROUND_UP - 1e-6)) * ROUND_UP / self.pair_steps)
 
     def _partner(self, ref: int) -> int:
         """View steps from the reference view to the other one of the pair."""

@@ -9,7 +9,7 @@ from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.similarity import FULL
 from matbench.space import DisparitySpace
 
-PRIOR = 0.25  # weight of the cost of being hidden, against 1 for a pair that sees the point
+PRIOR = 0.25  # weight of `hidden` in the mean cost of a point, as against 1 for a pair that sees the point
 
 
 @kernel
@@ -26,7 +26,7 @@ def _seen_rays(mu, view, first, origin, fineness, top, end, seen):  # type: igno
 
 
 def seen_rays(mu: NDArray[np.float32], space: DisparitySpace, view: int, threads: int = 1) -> NDArray[np.float32]:
-    """(H, W, planes) mu V_view on the pixel rays of a view: where each ray ends; sums to at most 1."""
+    """(H, W, planes) float32 mu V_view on the pixel rays of a view: where each ray ends. It sums to at most 1 a ray."""
     seen = np.empty((space.rows, space.width, space.planes), np.float32)
     over_rows(
         lambda top, end: _seen_rays(mu, view, space.first, space.origin, space.fineness, top, end, seen),
@@ -37,10 +37,14 @@ def seen_rays(mu: NDArray[np.float32], space: DisparitySpace, view: int, threads
 
 
 def by_ray(seen: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(H, W) plane index where a ray most likely ends: argmax of mu V, refined by its neighbours' share.
+    """(H, W) float32 plane index where each ray most likely ends; NaN where nothing is material along it.
 
-    The refinement is the centroid of the winner and its two neighbours. NaN where nothing is
-    material along the ray.
+    The winner is the plane of the largest mu V; the answer is the centroid of mu V over it and its two neighbours.
+
+    Parameters
+    ----------
+    seen
+        (H, W, planes) from `seen_rays`.
     """
     planes = seen.shape[2]
     best = np.argmax(seen, axis=2)
@@ -54,10 +58,10 @@ def by_ray(seen: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def by_plane(mu: NDArray[np.float32], space: DisparitySpace, view: int, target: float) -> NDArray[np.float32]:
-    """(H, W) plane index of the nearest of the `target` most material points of each epipolar plane.
+    """(H, W) float32 plane index of the nearest of the `target` most material points of each epipolar plane.
 
-    The paper's rule: every epipolar plane alone. NaN where a ray meets none of them. Of equal
-    materialities the nearer points are taken first.
+    This is the paper's rule, which takes every epipolar plane alone. NaN where a ray meets none of these points.
+    Of equal materialities the nearer points are taken first.
     """
     found = np.full((space.rows, space.width), np.nan, np.float32)
     count = min(round(target), space.planes * space.columns)
@@ -112,11 +116,13 @@ def visible_cost(
     """Dissimilarity on the pixel rays of a view, as far as the other views see the points.
 
     cost(s) = (sum over pairs V_ij (1 - rho_ij) + PRIOR hidden) / (sum over pairs V_ij + PRIOR),
-    with V_ij the product of the visibilities of i and j but for `view` itself, whose ray is being
-    read. A plane does not hide the one behind it, as surfaces may lie between the two.
+    with V_ij the product of the visibilities of i and j, that of `view` itself left out: all points of its
+    ray are candidates. A plane does not hide the one behind it, as surfaces may lie between the two.
 
     Parameters
     ----------
+    mu
+        (rows, planes, columns) materialities.
     rho
         (rows, pairs, planes, columns) similarities in 255ths.
     hidden
@@ -124,7 +130,8 @@ def visible_cost(
 
     Returns
     -------
-    Two (H, W, planes) float32 arrays: the cost and mu.
+    cost, material
+        (H, W, planes) float32: the cost, and mu on the same rays.
     """
     cost = np.empty((space.rows, space.width, space.planes), np.float32)
     material = np.empty_like(cost)

@@ -11,7 +11,7 @@ from matbench.space import DisparitySpace
 
 @helper
 def _add_between(values, fineness, phase, out):  # type: ignore[no-untyped-def]
-    """Adds the linear interpolation of a row of pixels at one phase between them, from `out[phase]` on."""
+    """Adds to every `fineness`-th number of `out`, from `phase` on, a row of pixels interpolated at that phase."""
     share = np.float32(phase / fineness)
     rest = np.float32(1) - share
     if phase == 0:
@@ -24,7 +24,17 @@ def _add_between(values, fineness, phase, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def add_view(found, view, first, origin, fineness, top, end, ended, reached):  # type: ignore[no-untyped-def]
-    """Adds w of one view to `ended` and its V to `reached`, for rows top..end (see `consensus`)."""
+    """Adds w of one view to `ended` and its V to `reached`, for rows top..end (see `consensus`).
+
+    Parameters
+    ----------
+    found
+        (H, W) float32 plane in which the ray of every pixel of that view ends.
+    view, first, origin, fineness
+        Index of the view, and the space's numbers of that name.
+    ended, reached
+        (rows, planes, columns) float32, both added to.
+    """
     width, planes = found.shape[1], ended.shape[1]
     ends, open_ = np.empty(width, np.float32), np.empty(width, np.float32)
     zero, one, two = np.float32(0), np.float32(1), np.float32(2)
@@ -43,13 +53,13 @@ def add_view(found, view, first, origin, fineness, top, end, ended, reached):  #
 def consensus(space: DisparitySpace, maps: NDArray[np.float32], threads: int = 1) -> NDArray[np.float32]:
     """(rows, planes, columns) float32: of the rays that reach a point, the share that ends there.
 
-    mu = (sum over i w_i + 0.05) / (sum over i V_i + 0.5) with w_i and V_i of `Fusion.seen_cost`;
-    between pixels both are linear.
+    mu = (sum over i w_i + 0.05) / (sum over i V_i + 0.5), with w_i and V_i as in `Fusion.seen_cost`. Between
+    the pixels of a row both are interpolated linearly.
 
     Parameters
     ----------
     maps
-        (views, H, W) planes of the space in which the rays end, fractions included, no NaN.
+        (views, H, W) float32 planes of the space in which the rays end, fractions included, no NaN.
     """
     ended = np.full(space.shape, ENDED, np.float32)
     reached = np.full(space.shape, PRIOR, np.float32)

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from attrs import frozen
 
-from matbench.algorithms.materiality.passes import Energy, Floats
+from matbench.algorithms.materiality.objective import Energy
+from matbench.algorithms.materiality.passes import Count, Floats, Room
 from matbench.algorithms.materiality.rows import RISE as RISE
 from matbench.algorithms.materiality.rows import ROW, descend_rows, follow
 
@@ -14,19 +15,19 @@ Listener = Callable[[int, dict[str, float], Floats, Floats], None]
 
 @frozen(eq=False)
 class Descent:
-    """How to minimise.
+    """How the energy is minimised.
 
     Parameters
     ----------
     passes
         Sweeps over all points, at most.
     accelerated
-        FISTA: each pass starts from now + beta (now - before); otherwise beta = 0.
+        FISTA (Beck & Teboulle 2009): each pass starts from now + beta (now - before); otherwise beta = 0.
     step
         Length of a gradient step.
     tolerance
-        Stop when a pass lowers the energy by less than this share, or that of a row where rows
-        descend on their own; 0 = never.
+        Stop when a pass lowers the energy by less than this share; where rows descend on their own, a row
+        stops by its own energy. 0 = never.
     threads
         The result does not depend on it.
     """
@@ -42,28 +43,30 @@ class Descent:
     ) -> tuple[Floats, dict[str, list[float]], int, int]:
         """Descend from `mu`, which is overwritten.
 
-        An accelerated pass whose energy exceeds that of the last accepted pass is rejected: the
+        An accelerated pass whose energy exceeds that of the last accepted pass is rejected, and the
         next one starts without momentum. If the energy rises even so, the step is halved and the
         point is accepted as a restart. Where nothing couples rows, every row does so on its own.
 
         Parameters
         ----------
+        mu
+            (rows, planes, columns) materialities to start from.
         listener
-            Is told pass, energies, and where the gradient was taken the materialities and their
-            derivative.
+            Called after every accepted pass with its number, its energies, and the materialities and the
+            derivative dE/dmu at the point where the gradient was taken.
 
         Returns
         -------
         mu
             (rows, planes, columns) materialities after the last step.
         history
-            Per accepted pass the energies where its gradient was taken, and ``restart`` = 1 for
-            the passes from which on the energy is compared anew; else 0. Where nothing couples rows,
-            per pass the sums over them, with what the last accepted pass of each came to.
+            One number for each accepted pass: the energies where its gradient was taken, and ``restart``, 1 if
+            the pass is a restart, else 0. Where nothing couples rows there is one for each pass, a sum over
+            the rows; a row whose pass was rejected counts with its last accepted one.
         passes
             How many passes were made, rejected ones included; the most of any row.
         updates
-            How many points all of them stepped.
+            How many steps of single points all passes made.
         """
         told = None if listener is None else _Told(energy, mu, self.threads, listener)
         return self._row_by_row(energy, mu, told) if energy.uncoupled else self._all_rows(energy, mu, told)
@@ -104,7 +107,7 @@ class Descent:
         states["data"], states["momentum"], states["step"] = np.inf, 1, self.step
         at_once = 1 if told is not None else self.passes
         history: dict[str, list[float]] = {}
-        terms, full = energy.terms(kind), 1 / energy.scale
+        terms, counting = energy.terms(kind), Count(energy.pressure * (1 / energy.scale) / 2, energy.target, 0.0)
         for first in range(0, self.passes, max(1, at_once)):
             if states["stopped"].all():
                 break
@@ -112,11 +115,10 @@ class Descent:
                 told.look(mu, before, states["beta"])
             course = np.empty((at_once, 4, len(mu)))
 
-            def work(top: int, end: int, room: tuple[Floats, ...], course: Floats = course) -> None:
+            def work(top: int, end: int, room: Room, course: Floats = course) -> None:
                 descend_rows(
-                    mu, before, kind(1), *terms, energy.pressure * full / 2, energy.target,
-                    self.accelerated, self.tolerance, top, end, room, states, course,
-                )  # fmt: skip
+                    mu, before, *terms, counting, self.accelerated, self.tolerance, top, end, room, states, course
+                )
 
             energy.over_rows(work, kind, self.threads)
             for number, (data, count, adjacent, restart) in enumerate(course.sum(axis=2).tolist(), first):
@@ -139,14 +141,17 @@ class Descent:
 
 
 class _Told:
-    """What a listener is told of a pass: found in a pass of its own, as one that keeps slopes may round otherwise."""
+    """What a listener is told of a pass."""
+
+    # found in a pass of its own: one that keeps slopes is compiled differently and may round differently,
+    # and listening must not change the answer
 
     def __init__(self, energy: Energy, mu: Floats, threads: int, listener: Listener):
         self._energy, self._threads, self._listener = energy, threads, listener
         self._at, self._slopes, self._unused = np.empty_like(mu), np.empty_like(mu), np.empty_like(mu)
 
     def look(self, now: Floats, before: Floats, beta: Floats) -> None:
-        """At now + beta (now - before), with one beta or one for every row."""
+        """Find the slopes at now + beta (now - before); `beta` is one number, or one for every row."""
         beta = np.broadcast_to(beta.astype(now.dtype), len(now))[:, None, None]
         with np.errstate(invalid="ignore"):  # without momentum, nothing is known about the pass before
             at = np.clip(now + beta * (now - before), 0, 1)
@@ -154,4 +159,5 @@ class _Told:
         self._energy.step(self._at, self._at, 0.0, 0.0, self._unused, self._slopes, self._threads)
 
     def tell(self, number: int, energies: dict[str, float]) -> None:
+        """Pass on what `look` found, with the pass's number and energies."""
         self._listener(number, energies, self._at, self._slopes)

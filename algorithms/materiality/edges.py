@@ -11,7 +11,10 @@ from matbench.space import DisparitySpace
 
 @kernel
 def _mean_weights(per_view, first, origin, top, end, weights):  # type: ignore[no-untyped-def]
-    """Weights of target points in 255ths: the mean over the views that see them."""
+    """weights (rows, planes, columns) in 255ths = the mean over the views that see a point of their weights.
+
+    `per_view` (views, rows, samples) are weights in [0, 1].
+    """
     views, _, samples = per_view.shape
     _, planes, columns = weights.shape
     total, count = np.empty(columns, np.float32), np.empty(columns, np.float32)
@@ -38,9 +41,9 @@ def edge_weights(
     Parameters
     ----------
     rows
-        (views, 3, H, samples) the views' rows; |dI| is the mean over colours.
+        (views, 3, H, samples) float32 colours; |dI| is the mean over them.
     edge
-        Grey levels, over a pixel.
+        Grey levels of difference from one pixel to the next over which a weight falls to 1/e.
 
     Returns
     -------

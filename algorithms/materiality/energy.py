@@ -11,9 +11,29 @@ Residuals are kept in units of rho, so that bytes are read as they are: with `fu
 r = full mu V_i V_j - rho, slopes are full / 2 dE/dmu and energies full^2 E.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import fill, helper, kernel
+
+
+class Rays(NamedTuple):
+    """The rays of all views in one plane of a row.
+
+    Parameters
+    ----------
+    seen, behind
+        (views, wide) V and A of equations 3, 9 and 10.
+    place, slide
+        Column 0 of the plane is sample `place` in the row of view 0, and `slide` less in that of every next view.
+    """
+
+    seen: NDArray[np.floating]
+    behind: NDArray[np.floating]
+    place: int
+    slide: int
 
 
 @helper
@@ -87,46 +107,44 @@ def see_layer(mu, mark, bottom, top, first, origin, one, margin, seen):  # type:
 
 
 @helper
-def chain(  # type: ignore[no-untyped-def]
-    mu, seen, rho, y, k, view, links, place, slide, full, one, behind, slope, pull, step, bias, new, slopes
-):
+def chain(mu, rays, rho, full, y, k, view, links, slope, pull, step, bias, new, slopes):  # type: ignore[no-untyped-def]
     """Consecutive pairs of one plane from `view` on, as many as the tuple `links` is long, in one loop over x.
 
     At every point, view after view: r = full mu V_i V_j - rho; the slope gains r V_i V_j - V_i A_i;
     A_i = g_i + (1 - mu) A_i with g_i = mu (r' V_h + r V_j), h and r' being those of the pair before.
-    That the number of views is known to the compiler keeps all of it in registers.
 
     Parameters
     ----------
     mu, slope
         (columns,) of this plane. A `slope` of None starts at 0.
-    seen, behind
-        (views, wide) V and A of equations 3, 9 and 10. `place` is column 0 in the row of `view`; in the next
-        view's it is `slide` less.
+    rays
+        `Rays` of the plane; A of those views is overwritten with that of the next plane.
     rho
-        (rows, pairs, planes, columns).
+        (rows, pairs, planes, columns), of which row y and plane k count.
     pull
-        (columns,) r V of the pair before in, that of the last pair out; None starts at 0.
+        (columns,) r V: that of the pair before on entry, that of the last pair on return. None starts at 0.
     new, slopes
-        (rows, planes, columns). With `new` the last view is finished, too, the stepped point
-        goes there, and its slope to `slopes` unless that is None. Without, slope and pull go on.
+        (rows, planes, columns). If `new` is given, the last view is finished as well: the stepped point is
+        written there, and its slope to `slopes` unless that is None. Otherwise slope and pull are handed on.
 
     Returns
     -------
     Sum of r^2.
     """
-    zero = one - one
+    # the compiler knows the length of a tuple, and so keeps all views of a point in registers
     kind = mu.dtype.type
+    zero, one = kind(0), kind(1)
+    seen, behind, place, slide = rays
     energy = zero
     for x in range(np.uintp(mu.size)):
         m = mu[x]
-        at = x + np.uintp(place)
+        at = x + np.uintp(place - view * slide)
         v = seen[view, at]
         gained = zero if slope is None else slope[x]
         before = zero if pull is None else pull[x]
         for link in range(len(links)):
             i = view + link
-            beside = x + np.uintp(place - (link + 1) * slide)
+            beside = x + np.uintp(place - (i + 1) * slide)
             w = seen[i + 1, beside]
             both = v * w
             r = full * m * both - kind(rho[y, i, k, x])
@@ -156,7 +174,7 @@ def chain(  # type: ignore[no-untyped-def]
 def match(mu, vi, vj, rho, full, pull_i, pull_j):  # type: ignore[no-untyped-def]
     """Any pair in one plane: `pull_i` gains r V_j and `pull_j` r V_i. Returns the sum of r^2."""
     kind = mu.dtype.type
-    energy = full - full
+    energy = kind(0)
     for x in range(mu.size):
         r = full * mu[x] * vi[x] * vj[x] - kind(rho[x])
         energy += r * r
@@ -166,9 +184,12 @@ def match(mu, vi, vj, rho, full, pull_i, pull_j):  # type: ignore[no-untyped-def
 
 
 @helper
-def shade(mu, through, half, slope, pull, behind):  # type: ignore[no-untyped-def]
-    """One view after all its pairs, which share out r V_i V_j evenly: A = g + (1 - mu) A, and no pull any more."""
-    zero = half - half
+def shade(mu, through, slope, pull, behind):  # type: ignore[no-untyped-def]
+    """One view after all its pairs: A = g + (1 - mu) A; its pull is spent and set to 0.
+
+    Every pair adds r V_i V_j to the slope once for each of its two views: half of it each time.
+    """
+    zero, half = mu.dtype.type(0), mu.dtype.type(0.5)
     for x in range(mu.size):
         g, a = pull[x], behind[x]
         slope[x] += through[x] * (half * g - a)
@@ -177,9 +198,9 @@ def shade(mu, through, half, slope, pull, behind):  # type: ignore[no-untyped-de
 
 
 @helper
-def descend(mu, slope, y, k, step, bias, one, new, slopes):  # type: ignore[no-untyped-def]
-    """new = mu - step (slope + bias), kept within [0, 1], in row y and plane k; unless None, `slopes` gets it."""
-    zero = one - one
+def descend(mu, slope, y, k, step, bias, new, slopes):  # type: ignore[no-untyped-def]
+    """new = mu - step (slope + bias), kept within [0, 1], in row y and plane k; `slopes` = slope + bias or None."""
+    zero, one = mu.dtype.type(0), mu.dtype.type(1)
     out = new[y, k]
     for x in range(mu.size):
         out[x] = min(max(mu[x] - step * (slope[x] + bias), zero), one)
@@ -195,7 +216,7 @@ def tie(mu, above, below, w_above, w_below, w_along, across, along, slope):  # t
     Parameters
     ----------
     mu, above, below
-        (columns + 2,) materialities of row y, y - 1 and y + 1 with a column more at either end; at
+        (columns + 2,) materialities of rows y, y - 1 and y + 1, with one more column at either end. Beyond
         the image's border, those of row y itself.
     w_above, w_below
         (columns,) uint8 edge weights between y - 1 and y, y and y + 1.
@@ -211,7 +232,7 @@ def tie(mu, above, below, w_above, w_below, w_along, across, along, slope):  # t
     across sum w (mu(y + 1) - mu(y))^2 + along sum w (mu(x + 1) - mu(x))^2.
     """
     kind = mu.dtype.type
-    energy = across - across
+    energy = kind(0)
     before, here, after = mu[:-2], mu[1:-1], mu[2:]
     up, down, w_before, w_after = above[1:-1], below[1:-1], w_along[:-1], w_along[1:]
     for x in range(slope.size):

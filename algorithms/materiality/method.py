@@ -14,8 +14,8 @@ from matbench.algorithms.materiality.binarize import by_plane, by_ray, seen_rays
 from matbench.algorithms.materiality.consensus import consensus
 from matbench.algorithms.materiality.descent import Descent
 from matbench.algorithms.materiality.edges import edge_weights
+from matbench.algorithms.materiality.objective import Energy
 from matbench.algorithms.materiality.parameters import EnergyTerms, Solver, silent
-from matbench.algorithms.materiality.passes import Energy
 from matbench.algorithms.materiality.start import start
 from matbench.algorithms.similarity import FULL, Matcher, Matching
 from matbench.scene import Scene

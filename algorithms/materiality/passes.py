@@ -1,15 +1,12 @@
-"""Passes over all rows: the energy (equation 5) of a whole scene, its gradient, and steps along it."""
+"""Passes over all rows: energies and gradient (equations 5 to 10) at a point, and a step from there."""
 
-from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
-from attrs import field, frozen
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import fill, helper, kernel
-from matbench.algorithms.materiality.energy import chain, descend, mark_layers, match, see_layer, shade, tie
-from matbench.algorithms.parallel import over_rows, share
-from matbench.algorithms.similarity import FULL
+from matbench.algorithms.materiality.energy import Rays, chain, descend, mark_layers, match, see_layer, shade, tie
 from matbench.space import DisparitySpace
 
 LINKS = 4  # pairs that one loop takes on: with more, the compiler gives up checking that its arrays do not overlap
@@ -20,12 +17,130 @@ GROUP = (0,) * LINKS  # in a type that the compiler counts
 Floats = NDArray[np.floating]
 
 
+class Point(NamedTuple):
+    """Where a pass takes energies and gradient: now + beta (now - before), kept within [0, 1].
+
+    Parameters
+    ----------
+    now, before
+        (rows, planes, columns) materialities of this pass and of the one before; the latter are not read if
+        beta is 0.
+    """
+
+    now: Floats
+    before: Floats
+    beta: np.floating
+
+
+class Data(NamedTuple):
+    """What the materialities are compared with.
+
+    Parameters
+    ----------
+    rho
+        (rows, pairs, planes, columns) similarities in units of 1 / full; 0 outside either frustum.
+    full
+        How many of these units are 1, in the type of the materialities.
+    views, samples, first, origin
+        As in `DisparitySpace`.
+    """
+
+    rho: NDArray[np.generic]
+    full: np.floating
+    views: int
+    samples: int
+    first: int
+    origin: int
+
+
+class Pairs(NamedTuple):
+    """Which views are compared, in one of three ways; the others are None.
+
+    Parameters
+    ----------
+    any_views
+        (pairs, 2) views of each pair.
+    links
+        Consecutive views: a tuple as long as there are pairs, all taken in one loop.
+    rest
+        Consecutive views: a tuple as long as the pairs that are left when loops have taken `LINKS` at a time.
+    """
+
+    any_views: NDArray[np.int64] | None
+    links: tuple[int, ...] | None
+    rest: tuple[int, ...] | None
+
+
+class Ties(NamedTuple):
+    """How neighbouring points are tied (equation 8).
+
+    Parameters
+    ----------
+    weights
+        Edge weights down and right as from `edge_weights`, or None: no ties.
+    across, along
+        lambda_y and lambda_x for one unit of weight and slope.
+    """
+
+    weights: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None
+    across: np.floating
+    along: np.floating
+
+
+class Count(NamedTuple):
+    """The count term's part of the slope of every point in a row: pressure (sum of mu - target) + bias."""
+
+    pressure: float
+    target: float
+    bias: float
+
+
+class Room(NamedTuple):
+    """Workspace of `pass_rows`; every thread needs one of its own.
+
+    Parameters
+    ----------
+    ring
+        (3, planes, columns + 2) the point in the rows y - 1, y and y + 1, with one more column at either end.
+    marks
+        (layers, views, samples) V of the nearest plane of every layer of planes.
+    seen
+        (depth, views, wide) V of one layer.
+    behind, pulls
+        (views, wide) A and the sums of r V of all pairs.
+    line
+        (2, columns) slopes and pulls of a plane.
+    """
+
+    ring: Floats
+    marks: Floats
+    seen: Floats
+    behind: Floats
+    pulls: Floats
+    line: Floats
+
+    @classmethod
+    def of(cls, space: DisparitySpace, kind: np.dtype[np.floating]) -> "Room":
+        """One for scenes with that space and materialities of that type."""
+        wide = 2 * space.columns - space.samples
+        depth = max(1, min(space.planes, LAYER // (space.views * wide)))
+        shapes = (
+            (3, space.planes, space.columns + 2),
+            (-(-space.planes // depth), space.views, space.samples),
+            (depth, space.views, wide),
+            (space.views, wide),
+            (space.views, wide),
+            (2, space.columns),
+        )
+        return cls(*(np.zeros(shape, kind) for shape in shapes))
+
+
 @helper
-def _extrapolate(now, before, beta, one, out):  # type: ignore[no-untyped-def]
-    """out = now + beta (now - before), kept within [0, 1], and its sum."""
-    zero = one - one
+def _extrapolate(now, before, beta, out):  # type: ignore[no-untyped-def]
+    """out = now + beta (now - before), kept within [0, 1]. Returns its sum."""
+    zero, one = now.dtype.type(0), now.dtype.type(1)
     total = 0.0
-    if beta == zero:  # whatever `before` is
+    if beta == zero:  # at the start there is no pass before: what stands there may be anything
         for x in range(now.size):
             out[x] = now[x]
             total += np.float64(now[x])
@@ -38,31 +153,31 @@ def _extrapolate(now, before, beta, one, out):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _extrapolate_row(now, before, beta, one, out):  # type: ignore[no-untyped-def]
-    """The same for the planes of a row; columns that `out` has more, half at either end, are left alone."""
+def _extrapolate_row(now, before, beta, out):  # type: ignore[no-untyped-def]
+    """The same for all planes of a row. `out` may be wider: values go to its middle columns, the rest is left alone."""
     total = 0.0
     planes, columns = now.shape
-    more = (out.shape[1] - columns) // 2
+    margin = (out.shape[1] - columns) // 2
     for k in range(planes):
-        total += _extrapolate(now[k], before[k], beta, one, out[k, more : more + columns])
+        total += _extrapolate(now[k], before[k], beta, out[k, margin : margin + columns])
     return total
 
 
 @kernel
-def _count_rows(now, before, beta, one, top, end, counts):  # type: ignore[no-untyped-def]
-    """Sums of the rows top..end of the extrapolated materialities."""
-    mu = np.empty(now.shape[1:], now.dtype)
+def count_rows(point, top, end, counts):  # type: ignore[no-untyped-def]
+    """Sums of the rows top..end of the point."""
+    mu = np.empty(point.now.shape[1:], point.now.dtype)
     for y in range(top, end):
-        counts[y] = _extrapolate_row(now[y], before[y], beta, one, mu)
+        counts[y] = _extrapolate_row(point.now[y], point.before[y], point.beta, mu)
 
 
 @kernel
-def _border_rows(now, before, beta, one, block, beyond):  # type: ignore[no-untyped-def]
-    """The extrapolated rows just before and just after every `block` rows: (blocks, 2, planes, columns)."""
+def border_rows(point, block, beyond):  # type: ignore[no-untyped-def]
+    """The rows of the point just before and just after every `block` rows: (blocks, 2, planes, columns)."""
     for place in range(beyond.shape[0]):
         for side, y in enumerate((place * block - 1, (place + 1) * block)):
-            if 0 <= y < now.shape[0]:
-                _extrapolate_row(now[y], before[y], beta, one, beyond[place, side])
+            if 0 <= y < point.now.shape[0]:
+                _extrapolate_row(point.now[y], point.before[y], point.beta, beyond[place, side])
 
 
 @helper
@@ -87,272 +202,99 @@ def _match_pairs(mu, seen, rho, k, pairs, slide, origin, samples, full, pulls): 
     return energy
 
 
-def _room(space: DisparitySpace, kind: np.dtype[np.floating]) -> tuple[Floats, ...]:
-    """Workspace of `pass_rows`, which any thread needs once.
+@helper
+def _pass_plane(  # type: ignore[no-untyped-def]
+    y, k, above, here, below, rays, data, any_views, links, rest, weights, ties, room, step, offset, new, slopes, sums
+):
+    """One plane of a row: `sums`, the energies of pairs and ties so far, and these with the plane's added.
 
-    Returns
-    -------
-    ring
-        (3, planes, columns + 2) the point in the rows y - 1, y and y + 1, a column more at either end.
-    marks
-        (layers, views, samples) V of the nearest plane of every layer of planes.
-    seen
-        (depth, views, wide) V of one layer.
-    behind, pulls
-        (views, wide) A and the sums of r V of all pairs.
-    line
-        (2, columns) slopes and pulls of a plane.
+    What may be None is an argument of its own: only then does the compiler drop what does not happen.
     """
-    wide = 2 * space.columns - space.samples
-    depth = max(1, min(space.planes, LAYER // (space.views * wide)))
-    shapes = (
-        (3, space.planes, space.columns + 2),
-        (-(-space.planes // depth), space.views, space.samples),
-        (depth, space.views, wide),
-        (space.views, wide),
-        (space.views, wide),
-        (2, space.columns),
-    )
-    return tuple(np.zeros(shape, kind) for shape in shapes)
+    paired, tied = sums
+    _, columns = above.shape
+    columns -= 2
+    mu, slope, pull = here[k, 1 : 1 + columns], room.line[0], room.line[1]
+    zero = mu.dtype.type(0)
+    if weights is not None:
+        across, along = weights
+        tied += tie(
+            here[k], above[k], below[k], across[max(0, y - 1), k], across[y, k], along[y, k], ties.across, ties.along,
+            slope,
+        )  # fmt: skip
+    elif links is None:
+        fill(zero, slope)
+    if links is not None:
+        paired += chain(mu, rays, data.rho, data.full, y, k, 0, links, None, None, step, offset, new, slopes)
+    if rest is not None:
+        fill(zero, pull)
+        for view in range(0, data.views - 1 - len(rest), LINKS):
+            paired += chain(mu, rays, data.rho, data.full, y, k, view, GROUP, slope, pull, step, offset, None, None)
+        view = data.views - 1 - len(rest)
+        paired += chain(mu, rays, data.rho, data.full, y, k, view, rest, slope, pull, step, offset, new, slopes)
+    if any_views is not None:
+        paired += _match_pairs(
+            mu, rays.seen, data.rho[y], k, any_views, rays.slide, data.origin, data.samples, data.full, room.pulls
+        )
+        margin = columns - data.samples
+        for i in range(data.views):
+            start = i * rays.slide - data.origin
+            inside = slice(margin, margin + data.samples)
+            shade(
+                mu[start : start + data.samples],
+                rays.seen[i, inside],
+                slope[start : start + data.samples],
+                room.pulls[i, inside],
+                rays.behind[i, inside],
+            )
+        descend(mu, slope, y, k, step, offset, new, slopes)
+    return paired, tied
 
 
 @kernel
-def pass_rows(  # type: ignore[no-untyped-def]
-    now, before, beta, one, rho, full, views, pairs, links, rest, samples, first, origin, weights, across, along,
-    pressure, target, bias, beyond, step, top, end, room, new, slopes, sums,
-):  # fmt: skip
-    """One pass over rows top..end: energies and gradient at the extrapolated point, and the step.
+def pass_rows(point, data, pairs, ties, count, beyond, step, top, end, room, new, slopes, sums):  # type: ignore[no-untyped-def]
+    """One pass over rows top..end: energies and gradient at the point, and the step from there.
 
     Parameters
     ----------
-    now, before
-        (rows, planes, columns) materialities of this pass and the one before; the point is
-        now + beta (now - before).
-    rho
-        (rows, pairs, planes, columns) similarities in units of 1 / full; 0 outside either frustum.
-    pairs, links, rest
-        One of them, the others None: (pairs, 2) views of each pair; or, where pairs are
-        consecutive, a tuple as long as there are pairs, which are taken in one loop; or one as long
-        as the pairs that are left when loops have taken LINKS at a time.
-    weights
-        Edge weights down and right as from `edge_weights`, or None: no ties.
-    across, along
-        lambda_y and lambda_x for one unit of weight.
-    pressure, target, bias
-        The count term's derivative in a row is pressure (sum - target) + bias.
+    point, data, pairs, ties, count, room
+        `Point`, `Data`, `Pairs`, `Ties`, `Count` and `Room`.
     beyond
         (2, planes, columns) the point in the rows top - 1 and end; not read without ties.
-    room
-        Workspace from `_room`.
+    step
+        Length of the step, for slopes in units of `full` / 2.
     new
         (rows, planes, columns), overwritten: the stepped materialities; may be `before`.
     slopes
-        The same shape, overwritten with dE/dmu, or None.
+        The same shape, overwritten with the slopes, in the same units; or None.
     sums
-        (rows, 3), overwritten: E_data, adjacent-plane E_smooth and sum of mu of each row.
+        (rows, 3), overwritten: E_data, the ties' E_smooth and the sum of mu of each row.
     """
-    rows, planes, columns = now.shape
-    kind, zero = now.dtype.type, one - one
-    margin = columns - samples
-    ring, marks, seen, behind, pulls, line = room
-    depth, slope, pull = seen.shape[0], line[0], line[1]
+    rows, planes, columns = point.now.shape
+    kind = point.now.dtype.type
+    zero, one = kind(0), kind(1)
+    margin, origin = columns - data.samples, data.origin
+    ring, marks, seen, behind = room.ring, room.marks, room.seen, room.behind
+    depth = seen.shape[0]
     for y in range(top, end):
         for row in range(y - 1 if y == top else y + 1, y + 2):
             if top <= row < end:
-                sums[row, 2] = _extrapolate_row(now[row], before[row], beta, one, ring[row % 3])
-            elif weights is not None and 0 <= row < rows:
-                _extrapolate_row(beyond[int(row > y)], beyond[0], zero, one, ring[row % 3])
+                sums[row, 2] = _extrapolate_row(point.now[row], point.before[row], point.beta, ring[row % 3])
+            elif ties.weights is not None and 0 <= row < rows:
+                _extrapolate_row(beyond[int(row > y)], beyond[0], zero, ring[row % 3])
         above, here, below = ring[max(0, y - 1) % 3], ring[y % 3], ring[min(rows - 1, y + 1) % 3]
-        offset = kind(pressure * (sums[y, 2] - target) + bias)
-        data, ties = 0.0, 0.0
-        for i in range(views):
+        offset = kind(count.pressure * (sums[y, 2] - count.target) + count.bias)
+        energies = 0.0, 0.0
+        for i in range(data.views):
             fill(zero, behind[i])
-        mark_layers(here, first, origin - 1, one, depth, marks)
+        # `here` has a column more at either end
+        mark_layers(here, data.first, origin - 1, one, depth, marks)
         for bottom in range(0, planes, depth):
             nearest = min(planes, bottom + depth)
-            see_layer(here, marks[bottom // depth], bottom, nearest, first, origin - 1, one, margin, seen)
+            see_layer(here, marks[bottom // depth], bottom, nearest, data.first, origin - 1, one, margin, seen)
             for k in range(bottom, nearest):
-                slide = first + k
-                mu, through, place = here[k, 1 : 1 + columns], seen[k - bottom], margin + origin
-                if weights is not None:
-                    w_across, w_along = weights
-                    ties += tie(
-                        here[k], above[k], below[k], w_across[max(0, y - 1), k], w_across[y, k], w_along[y, k],
-                        across, along, slope,
-                    )  # fmt: skip
-                elif links is None:
-                    fill(zero, slope)
-                if links is not None:
-                    data += chain(
-                        mu, through, rho, y, k, 0, links, place, slide, full, one, behind, None, None, step, offset,
-                        new, slopes,
-                    )  # fmt: skip
-                if rest is not None:
-                    fill(zero, pull)
-                    for view in range(0, views - 1 - len(rest), LINKS):
-                        data += chain(
-                            mu, through, rho, y, k, view, GROUP, place - view * slide, slide, full, one, behind,
-                            slope, pull, step, offset, None, None,
-                        )  # fmt: skip
-                    view = views - 1 - len(rest)
-                    data += chain(
-                        mu, through, rho, y, k, view, rest, place - view * slide, slide, full, one, behind,
-                        slope, pull, step, offset, new, slopes,
-                    )  # fmt: skip
-                if pairs is not None:
-                    data += _match_pairs(mu, through, rho[y], k, pairs, slide, origin, samples, full, pulls)
-                    for i in range(views):
-                        start = i * slide - origin
-                        shade(
-                            mu[start : start + samples],
-                            through[i, margin : margin + samples],
-                            one / (one + one),
-                            slope[start : start + samples],
-                            pulls[i, margin : margin + samples],
-                            behind[i, margin : margin + samples],
-                        )
-                    descend(mu, slope, y, k, step, offset, one, new, slopes)
-        sums[y, 0], sums[y, 1] = data, ties
-
-
-@frozen(eq=False)
-class Energy:
-    """Equation 5 for one scene: E = E_data + E_smooth, with E_smooth = count term + adjacent points.
-
-    Parameters
-    ----------
-    space
-        Its target points.
-    pairs
-        (pairs, 2) views compared.
-    rho
-        (rows, pairs, planes, columns) similarities in units of `scale`.
-    target
-        N, the materialities that one epipolar plane should hold.
-    count
-        lambda of the count term lambda / N (sum mu - N)^2 (equation 7, over N so that lambda does
-        not depend on the image's size).
-    per_row
-        One count term for every epipolar plane; otherwise one for all, with `rows` N.
-    across, along
-        lambda_y and lambda_x of the squared differences to the next row and the next column.
-    weights
-        Their edge weights from `edge_weights`; not read where both are 0.
-    scale
-        Value of one unit of `rho`.
-    """
-
-    space: DisparitySpace
-    pairs: NDArray[np.int64]
-    rho: NDArray[np.uint8] | Floats
-    target: float
-    count: float
-    per_row: bool
-    across: float
-    along: float
-    weights: tuple[NDArray[np.uint8], NDArray[np.uint8]]
-    scale: float = 1 / FULL
-    rooms: list[tuple[Floats, ...]] = field(init=False, factory=list)
-
-    @property
-    def safe_step(self) -> float:
-        """Below the inverse of the largest curvature of the terms that couple many points (equation 11)."""
-        _, planes, columns = self.space.shape
-        counting = 2 * self.count * planes * columns / self.target
-        return 1 / (counting + 8 * (self.across + self.along) + 2 * len(self.pairs))
-
-    @property
-    def tied(self) -> bool:
-        """Whether adjacent points are."""
-        return self.across > 0 or self.along > 0
-
-    @property
-    def uncoupled(self) -> bool:
-        """Whether no term has points of several rows."""
-        return self.per_row and not self.across
-
-    @property
-    def pressure(self) -> float:
-        """The count term's derivative is this times what there is in excess of N."""
-        return 2 * self.count / self.target
-
-    def terms(self, kind: type[np.floating]) -> tuple[object, ...]:
-        """`rho` to `along` of `pass_rows`."""
-        space, full = self.space, 1 / self.scale
-        ties = self.weights if self.tied else None, kind(self.across * full / FULL), kind(self.along * full / FULL)
-        return self.rho, kind(full), space.views, *self._taken(), space.samples, space.first, space.origin, *ties
-
-    def over_rows(
-        self, work: Callable[[int, int, tuple[Floats, ...]], None], kind: type[np.floating], threads: int
-    ) -> None:
-        """Call ``work(top, end, room)`` for blocks of rows; a workspace outlives its pass."""
-
-        def borrow(top: int, end: int) -> None:
-            room = self.rooms.pop() if self.rooms else _room(self.space, np.dtype(kind))
-            work(top, end, room)
-            self.rooms.append(room)
-
-        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))
-
-    def _taken(self) -> tuple[NDArray[np.int64] | None, tuple[int, ...] | None, tuple[int, ...] | None]:
-        """`pairs`, `links` and `rest` of `pass_rows`."""
-        steps = np.arange(self.space.views - 1)
-        if not np.array_equal(self.pairs, np.stack([steps, steps + 1], axis=1)):
-            return self.pairs, None, None
-        if len(steps) <= LINKS and not self.tied:
-            return None, (0,) * len(steps), None
-        return None, None, (0,) * ((len(steps) - 1) % LINKS + 1)
-
-    def step(
-        self, now: Floats, before: Floats, beta: float, step: float, new: Floats, slopes: Floats | None, threads: int
-    ) -> dict[str, float]:
-        """Energies at now + beta (now - before); the point after a gradient step from there goes to `new`.
-
-        `new` may be `before`. `slopes`, (rows, planes, columns), is filled with dE/dmu if given.
-        All arrays have one type.
-        """
-        space, kind = self.space, now.dtype.type
-        extrapolated = now, before, kind(beta), kind(1)
-        full, block = 1 / self.scale, share(space.rows, threads)
-        sums = np.empty((space.rows, 3))
-        bias = 0.0
-        if not self.per_row:
-            over_rows(lambda top, end: _count_rows(*extrapolated, top, end, sums[:, 2]), space.rows, threads, block)
-            bias = self.pressure * (float(sums[:, 2].sum()) / space.rows - self.target)
-        # rows are overwritten in place: what their neighbours in other blocks read is set aside
-        beyond = np.empty((-(-space.rows // block) if self.tied else 0, 2, *now.shape[1:]), now.dtype)
-        _border_rows(*extrapolated, block, beyond)
-        terms = self.terms(kind)
-
-        def work(top: int, end: int, room: tuple[Floats, ...]) -> None:
-            pass_rows(
-                *extrapolated,
-                *terms,
-                self.pressure * full / 2 if self.per_row else 0.0,
-                self.target,
-                bias * full / 2,
-                beyond[top // block] if self.tied else now[:2],
-                kind(2 * step / full),
-                top,
-                end,
-                room,
-                new,
-                slopes,
-                sums,
-            )
-
-        self.over_rows(work, kind, threads)
-        if slopes is not None:
-            slopes *= kind(2 / full)
-        data, adjacent, total = (float(part) for part in sums.sum(axis=0) / (full * full, full, 1))
-        excess = (sums[:, 2] - self.target) if self.per_row else np.array([total / space.rows - self.target])
-        counted = self.count / self.target * float(np.square(excess).sum())
-        if not self.per_row:
-            counted *= space.rows
-        return {
-            "total": data + counted + adjacent,
-            "data": data,
-            "smooth": counted + adjacent,
-            "count": counted,
-            "adjacent": adjacent,
-        }
+                rays = Rays(seen[k - bottom], behind, margin + origin, data.first + k)
+                energies = _pass_plane(
+                    y, k, above, here, below, rays, data, pairs.any_views, pairs.links, pairs.rest, ties.weights,
+                    ties, room, step, offset, new, slopes, energies,
+                )  # fmt: skip
+        sums[y, 0], sums[y, 1] = energies

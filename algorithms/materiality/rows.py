@@ -1,13 +1,14 @@
-"""Descent of the energy where nothing couples rows: all passes over one while it is in the cache, then the next."""
+"""Descent of the energy where nothing couples rows: all passes over one row while it is in the cache, then the next."""
 
 import numpy as np
 
-from matbench.algorithms.kernels import kernel
-from matbench.algorithms.materiality.passes import pass_rows
+from matbench.algorithms.kernels import helper, kernel
+from matbench.algorithms.materiality.passes import Data, Point, Ties, pass_rows
 
 RISE = 1e-6  # but at a restart, an energy exceeds that of the pass before by at most this share
 
-# of one row: the parts of its energy after the last accepted pass, how the next pass goes on, passes made
+# the state of one row: the parts of its energy at the last accepted pass; momentum, beta and step of the next pass;
+# whether it has stopped, and how many passes it has made
 ROW = np.dtype([(name, np.float64) for name in ("data", "count", "adjacent", "momentum", "beta", "step")] + [
     ("stopped", np.int64), ("made", np.int64),
 ])  # fmt: skip
@@ -15,15 +16,24 @@ ROW = np.dtype([(name, np.float64) for name in ("data", "count", "adjacent", "mo
 
 @kernel
 def follow(total, last, momentum, beta, step, accelerated):  # type: ignore[no-untyped-def]
-    """What follows a pass whose energy is `total`, if that of the last accepted pass is `last`.
+    """Whether a pass is accepted, and how the next one goes on.
 
-    A rise beyond rounding rejects a pass with momentum, and the next one goes without; without
-    momentum it halves the step, and energies are compared anew.
+    If the energy rises by more than rounding, a pass with momentum is rejected and the next one has none. A pass
+    without momentum is accepted all the same, but the step is halved, and energies are compared anew from there.
+
+    Parameters
+    ----------
+    total, last
+        Energies of this pass and of the last accepted one.
+    momentum, beta, step
+        Of this pass.
+    accelerated
+        As in `Descent`.
 
     Returns
     -------
     accepted, restart
-        Whether the pass counts, and whether it is one from which on energies are compared anew.
+        Whether the pass counts, and whether energies are compared anew from it on.
     momentum, beta, step
         Of the next pass; see `Descent`.
     """
@@ -38,17 +48,34 @@ def follow(total, last, momentum, beta, step, accelerated):  # type: ignore[no-u
     return True, rises, momentum, beta, step
 
 
+@helper
+def _data_of(data, y):  # type: ignore[no-untyped-def]
+    """`Data` of row y alone."""
+    return Data(data.rho[y : y + 1], data.full, data.views, data.samples, data.first, data.origin)
+
+
+@helper
+def _ties_of(ties, weights, y):  # type: ignore[no-untyped-def]
+    """`Ties` of row y alone; `weights` are those in `ties`."""
+    if weights is None:  # noqa: SIM108 - the compiler keeps one branch only where there are two
+        edges = None
+    else:
+        edges = weights[0][y : y + 1], weights[1][y : y + 1]
+    return Ties(edges, ties.across, ties.along)
+
+
 @kernel
 def descend_rows(  # type: ignore[no-untyped-def]
-    now, before, one, rho, full, views, pairs, links, rest, samples, first, origin, weights, across, along,
-    pressure, target, accelerated, tolerance, top, end, room, states, course,
-):  # fmt: skip
+    now, before, data, pairs, ties, count, accelerated, tolerance, top, end, room, states, course
+):
     """Passes over rows top..end, each row with a step and restarts of its own.
 
     Parameters
     ----------
-    now, before, rho ... room
-        As in `pass_rows`; the first two are overwritten with those after the last pass.
+    now, before
+        (rows, planes, columns) materialities, overwritten with those of the last two passes.
+    data, pairs, ties, count, room
+        As in `pass_rows`.
     accelerated, tolerance
         As in `Descent`; the latter is asked of a row's energy.
     states
@@ -57,33 +84,29 @@ def descend_rows(  # type: ignore[no-untyped-def]
         (passes, 4, rows), overwritten: data, count and adjacent energy of a row at its last accepted
         pass so far, and 1 for a restart, else 0.
     """
-    kind, unit = now.dtype.type, np.float64(full)
-    count = pressure / unit  # lambda / N, as the pressure is full / 2 of the derivative
+    kind, unit = now.dtype.type, np.float64(data.full)
+    weight = count.pressure / unit  # lambda / N, as the pressure is full / 2 of the derivative
     sums = np.empty((1, 3))
     for y in range(top, end):
         state, a, b = states[y], now[y : y + 1], before[y : y + 1]
+        data_here, ties_here = _data_of(data, y), _ties_of(ties, ties.weights, y)
         turned = False
         for number in range(len(course)):
             restart = False
             if not state.stopped:
-                if weights is None:  # noqa: SIM108 - the compiler keeps one branch only where there are two
-                    edges = None
-                else:
-                    edges = weights[0][y : y + 1], weights[1][y : y + 1]
                 pass_rows(
-                    a, b, kind(state.beta), one, rho[y : y + 1], full, views, pairs, links, rest, samples, first,
-                    origin, edges, across, along, pressure, target, 0.0, a, kind(2 * state.step / unit), 0, 1, room,
-                    b, None, sums,
+                    Point(a, b, kind(state.beta)), data_here, pairs, ties_here, count, a,
+                    kind(2 * state.step / unit), 0, 1, room, b, None, sums,
                 )  # fmt: skip
-                data, ties, excess = sums[0, 0] / (unit * unit), sums[0, 1] / unit, sums[0, 2] - target
-                counted = count * excess * excess
-                last, total = state.data + state.count + state.adjacent, data + counted + ties
+                paired, tied, excess = sums[0, 0] / (unit * unit), sums[0, 1] / unit, sums[0, 2] - count.target
+                counted = weight * excess * excess
+                last, total = state.data + state.count + state.adjacent, paired + counted + tied
                 accepted, restart, state.momentum, state.beta, state.step = follow(
                     total, last, state.momentum, state.beta, state.step, accelerated
                 )
                 state.made += 1
                 if accepted:
-                    state.data, state.count, state.adjacent = data, counted, ties
+                    state.data, state.count, state.adjacent = paired, counted, tied
                     state.stopped = tolerance > 0 and 0 <= last - total < tolerance * total
                     a, b = b, a
                     turned = not turned

@@ -10,7 +10,7 @@ from matbench.algorithms.similarity import FULL, Matcher
 
 @kernel
 def mean_similarity(rho, pairs, first, origin, samples, mean):  # type: ignore[no-untyped-def]
-    """Mean of the similarities over the pairs with both frusta; 0 where there is none.
+    """Mean of the similarities over the pairs that hold a point in both frusta; 0 where none does.
 
     Parameters
     ----------
@@ -43,9 +43,14 @@ def mean_similarity(rho, pairs, first, origin, samples, mean):  # type: ignore[n
 
 @kernel
 def soften(mean, views, first, origin, samples, sharpness):  # type: ignore[no-untyped-def]
-    """exp(sharpness (mean - 1)), normalised along each ray, averaged over the views that see a point.
+    """mean <- exp(sharpness (mean - 1)), normalised along each ray and averaged over the views that see a point (12).
 
-    Works in place on (rows, planes, columns).
+    Parameters
+    ----------
+    mean
+        (rows, planes, columns) float32, overwritten.
+    views, first, origin, samples
+        Of the disparity space.
     """
     rows, planes, columns = mean.shape
     along = np.empty((views, samples), np.float32)
@@ -88,8 +93,7 @@ def start(
     rho
         (rows, pairs, planes, columns) similarities in 255ths.
     soft
-        exp(sharpness (mean rho - 1)), normalised along each ray and averaged over the views;
-        otherwise the mean rho itself, as in the paper.
+        `soften` the mean of rho; otherwise it is taken as it is, as in the paper.
     """
     space = matcher.space
     mu = np.empty(space.shape, np.float32)

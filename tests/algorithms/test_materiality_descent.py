@@ -9,7 +9,7 @@ from attrs import evolve
 from matbench.algorithm import Context, Probe
 from matbench.algorithms.materiality import Materiality
 from matbench.algorithms.materiality.descent import RISE, Descent
-from matbench.algorithms.materiality.passes import Energy
+from matbench.algorithms.materiality.objective import Energy
 from matbench.algorithms.similarity import pairs
 from matbench.datasets.synthetic import SYNTHETIC
 from matbench.space import DisparitySpace

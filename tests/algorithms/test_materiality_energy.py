@@ -11,7 +11,7 @@ from matbench.algorithms.materiality.binarize import PRIOR, by_plane, by_ray, se
 from matbench.algorithms.materiality.consensus import consensus
 from matbench.algorithms.materiality.edges import edge_weights
 from matbench.algorithms.materiality.energy import see_row
-from matbench.algorithms.materiality.passes import Energy
+from matbench.algorithms.materiality.objective import Energy
 from matbench.algorithms.materiality.start import mean_similarity, soften
 from matbench.algorithms.similarity import pairs
 from matbench.space import DisparitySpace, Volume, visibility

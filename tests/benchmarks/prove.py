@@ -89,7 +89,7 @@ PLANTS = (
     ),
     Plant(
         "passes",
-        "algorithms/materiality/passes.py",
+        "algorithms/materiality/objective.py",
         (
             (
                 "        over_rows(borrow, self.space.rows, threads, share(self.space.rows, threads))\n",

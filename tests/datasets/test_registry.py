@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from matbench.datasets import make_registry
-from matbench.datasets.middlebury import ROUND_UP, Middlebury
+from matbench.datasets.middlebury import Middlebury
 from matbench.datasets.registry import REGISTRY, YEARS, registry
+from matbench.datasets.stored import ROUND_UP
 from matbench.errors import UserError
 from matbench.files.images import pixel_digests, read_size
 
