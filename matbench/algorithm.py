@@ -1,7 +1,7 @@
 """What a method is given and what it returns: the one interface of the harness."""
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from attrs import field, frozen
@@ -104,9 +104,6 @@ class Algorithm(Protocol):
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """Estimate the disparities of the scene's reference view, at least."""
         ...
-
-
-Presets = ClassVar[Mapping[str, Mapping[str, object]]]
 
 
 def unsupported(method: Algorithm, scene: Scene) -> str:

@@ -54,6 +54,9 @@ class Comparison:
         The line that asked for it, for the report.
     left_out
         Why -> scenes that a pattern means but that cannot be compared.
+    files
+        Users' own files that may be read: scenes and metrics in them are known. Those that a plan names are read
+        only if they are here, too: a run folder may come from anywhere.
     """
 
     plan: Plan
@@ -62,6 +65,7 @@ class Comparison:
     settings: Settings
     command: str
     left_out: Mapping[str, Sequence[str]] = {}
+    files: tuple[Path, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -114,6 +118,10 @@ class Comparison:
 
     def tables(self) -> Tables:
         """Score the stored maps; write ``results.csv`` and ``cells.csv``, and ``reliability.csv`` if it has rows."""
+        with plugins.using(self.files):
+            return self._tables()
+
+    def _tables(self) -> Tables:
         with locked(self.folder):
             found = scores.tables(self.plan, self.store, self.scenes)
             self.store.sweep()
@@ -140,7 +148,8 @@ class Comparison:
         found = freshness.made(self.store)
         if found is None or not found.page:
             return None
-        now = freshness.Made.now(self.plan, self.store, self.scenes, todo.outcomes)
+        with plugins.using(self.files):
+            now = freshness.Made.now(self.plan, self.store, self.scenes, todo.outcomes)
         page = freshness.page_digest(self.store, self._asked(is_ablation))
         if found != evolve(now, unsteady=found.unsteady, page=page):
             return None
@@ -172,6 +181,8 @@ class Comparison:
 
         stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.scored}
         path = self.folder / freshness.PAGE
+        with plugins.using(self.files):
+            better = {m.name: m.better for m in scores.metrics()}
         outcomes = {key: tables.outcomes.get(cell.key) for key, cell in stored.items()}
 
         def disparity(algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
@@ -198,7 +209,7 @@ class Comparison:
                 ablation=ablation,
                 sweeps=tuple(sweeps),
                 reliability=tables.reliability,
-                higher=frozenset(m.name for m in scores.metrics() if m.better == "higher"),
+                better=better,
                 volumes=volume,
                 histories={key: outcome.history for key, outcome in outcomes.items() if outcome is not None},
                 parameters={(c.method.algorithm, c.method.changed): c.method.params for c in self.plan.cells},
@@ -309,10 +320,26 @@ def prepare(
 
     Parameters are those of `compare`; without `write` not even the plan is written.
     """
+    files = [Path(file).resolve() for file in ([plugin] if isinstance(plugin, str | Path) else plugin)]
+    with plugins.using(files):
+        return _prepare(algorithms, scenes, settings, out, seed, files, command, repeats, write)
+
+
+def _prepare(
+    algorithms: str | Sequence[str] | None,
+    scenes: str | Sequence[str] | None,
+    settings: Settings,
+    out: str | Path | None,
+    seed: int | Sequence[int],
+    files: Sequence[Path],
+    command: str | None,
+    repeats: int,
+    write: bool,
+) -> Comparison:
+    """What `prepare` says, where scenes of one's own are known."""
     if not 1 <= repeats <= 100:
         raise UserError(f"repeats {repeats} is not a whole number from 1 to 100")
     rows = settings.record.rows if settings.record is not None else ()
-    files = [Path(file).resolve() for file in ([plugin] if isinstance(plugin, str | Path) else plugin)]
     seeds = _seeds(seed)
     own = [p.name for file in files for p in plugins.from_file(file).values()]
     chosen = methods(algorithms if algorithms is not None else [*default_algorithms(), *own], files)
@@ -357,7 +384,7 @@ def prepare(
     else:
         store = Store(folder)
         store.check(plan)
-    return Comparison(plan, store, by_name, evolve(settings, data=root), said, left_out)
+    return Comparison(plan, store, by_name, evolve(settings, data=root), said, left_out, tuple(files))
 
 
 def compare(
@@ -396,7 +423,7 @@ def compare(
     seed
         One seed or several.
     plugin
-        Python files that hold further methods.
+        Python files that hold further methods, scenes and metrics.
     row
         The image row whose epipolar slices recordings show, or several; the middle one if not given.
     repeats

@@ -1,16 +1,19 @@
-"""Scoring runs on disk again, and joining runs. No method runs, and no plug-in file is read."""
+"""Scoring runs on disk again, and joining runs. No method runs, and no plug-in file is read but those given."""
 
+import shlex
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import pandas as pd
 from attrs import evolve, field, frozen
 
 from matbench.comparison import Comparison
 from matbench.errors import UserError
+from matbench.plans import plugins
 from matbench.plans.plan import Cell, Method, Plan
 from matbench.plans.settings import Settings
-from matbench.results import archive
+from matbench.results import archive, scores
 from matbench.runs.store import Outcome, Store
 from matbench.scene import Scene
 from matbench.scenes.catalogue import data_root, load_scene
@@ -48,34 +51,64 @@ class Scenes:
 
 
 def open_run(
-    folder: Path, data: str | Path | None = None, partial: bool = False
+    folder: Path, data: str | Path | None = None, partial: bool = False, plugin: Sequence[Path] = ()
 ) -> tuple[Comparison, Mapping[str, str]]:
     """A run on disk as a comparison, as `matbench.comparison.prepare` made it; and left-out scenes -> why.
 
     Parameters
     ----------
     partial
-        Leave out the scenes that are missing or have changed.
+        Leave out the scenes that are missing or have changed, and the metrics that nothing offers.
+    plugin
+        The users' own files that are read. Those that the run names are not: it may come from anywhere.
 
     Raises
     ------
     UserError
-        If the folder holds no run, or scenes are missing and `partial` is not given.
+        If the folder holds no run, or scenes or metrics are missing and `partial` is not given.
     """
+    with plugins.using(plugin):
+        return _open_run(folder, data, partial)
+
+
+def _open_run(folder: Path, data: str | Path | None, partial: bool) -> tuple[Comparison, Mapping[str, str]]:
     store, root = Store(folder), data_root(data)
     store.check_place()
     plan = store.plan()
+    unread = [file for file in plan.plugin_files if Path(file) not in plugins.used()]
+    files = f"; --plugin reads {shlex.join(unread)} or another file that has it" if unread else ""
     scenes = Scenes.of(plan, root)
     if scenes.missing and not (partial and scenes.found):
         said = "; ".join(f"{name}: {why}" for name, why in scenes.missing.items())
-        hint = "" if partial or not scenes.found else "; --partial scores the other scenes"
+        hint = files + ("" if partial or not scenes.found else "; --partial scores the other scenes")
         raise UserError(f"{len(scenes.missing)} of {len(scenes.missing) + len(scenes.found)} scenes: {said}{hint}")
+    lacking = lost_metrics(store.folder / "results.csv")
+    if lacking and not partial:
+        hint = files or "; --plugin reads a file that has it"
+        raise UserError(
+            f"nothing offers {', '.join(lacking)} of {store.folder / 'results.csv'}{hint}; --partial goes on without"
+        )
     kept = tuple(cell for cell in plan.cells if cell.scene in scenes.found)
     spellings = {name: of for name, of in plan.spellings.items() if of in scenes.found}
     settings = Settings(data=root)
     return Comparison(
-        evolve(plan, cells=kept, spellings=spellings), store, scenes.found, settings, store.command()
+        evolve(plan, cells=kept, spellings=spellings),
+        store,
+        scenes.found,
+        settings,
+        store.command(),
+        files=plugins.used(),
     ), scenes.missing
+
+
+def lost_metrics(table: Path) -> list[str]:
+    """The metrics of a run's table that neither installed plug-ins nor the files in use offer."""
+    try:
+        named = pd.read_csv(table, usecols=["metric"], dtype=str)["metric"].dropna().unique()
+    except (OSError, ValueError):  # there is none, or a damaged one, which is made anew
+        return []
+    known = {metric.name for metric in scores.metrics()}
+    return [name for name in named if name not in known]
 
 
 def join(folders: Sequence[Path], out: Path) -> Store:

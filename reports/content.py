@@ -7,6 +7,7 @@ import pandas as pd
 from attrs import field, frozen
 from numpy.typing import NDArray
 
+from matbench.measures.metrics import Better
 from matbench.measures.volumes import StoredVolume
 from matbench.results.sweeps import Sweep
 from matbench.scene import Scene
@@ -53,8 +54,8 @@ class Report:
         The curves of options that took several numbers.
     reliability
         Reliability curves of the volumes that were kept (`matbench.results.scores.reliabilities`).
-    higher
-        Metrics of which more is better; of all others, less is.
+    better
+        Metric -> which direction is better; of all others, less is.
     volumes
         Cell -> the volume that was kept, or None; read one at a time.
     histories
@@ -77,7 +78,7 @@ class Report:
     ablation: pd.DataFrame | None = None
     sweeps: tuple[Sweep, ...] = ()
     reliability: pd.DataFrame | None = None
-    higher: frozenset[str] = frozenset()
+    better: Mapping[str, Better] = field(factory=dict)
     volumes: Volumes = _no_volume
     histories: Mapping[Key, History] = field(factory=dict)
     parameters: Mapping[tuple[str, str], Mapping[str, Value]] = field(factory=dict)

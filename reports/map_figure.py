@@ -7,7 +7,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench.errors import UserError
+from matbench.errors import UserError, failure
+from matbench.measures.metrics import Metric, map_in_region
 from matbench.recording import coloring
 from matbench.reports.page_figures import printable
 from matbench.reports.paper_figure import INCHES, TALLEST, CaptionedFigure, Width, letter, small_print
@@ -39,8 +40,13 @@ class Maps:
     disparity: Mapping[tuple[str, str], NDArray[np.float32]]
 
 
-def draw(maps: Maps, width: Width = "column", errors: bool = False) -> CaptionedFigure:
+def draw(maps: Maps, width: Width = "column", errors: bool = False, metric: Metric | None = None) -> CaptionedFigure:
     """Draw reference views, truths and maps, one scene in each column; with `errors`, also the errors of each map.
+
+    Parameters
+    ----------
+    metric
+        One that has a picture, to be drawn of each map.
 
     Raises
     ------
@@ -51,7 +57,8 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Captioned
 
     inches = INCHES[width]
     lines = [maps.scenes[i : i + ABREAST[width]] for i in range(0, len(maps.scenes), ABREAST[width])]
-    rows, titles = _rows(maps, errors), _titles(maps.scenes)
+    pictures = Pictures.of(maps, metric)
+    rows, titles = _rows(maps, errors, pictures), _titles(maps.scenes)
     across = max(map(len, lines))
     shapes = [max(s.height / s.width for s in line) for line in lines]
     spare = TALLEST - sum(0.24 + 0.03 * len(rows) for _ in lines)
@@ -74,7 +81,7 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Captioned
                     bottom = below - (number + 1) * (height + 0.03)
                     box = (margin + at * side + 0.01, bottom, side - 0.02, height)
                     axis = figure.add_axes((box[0] / inches, box[1] / tall, box[2] / inches, box[3] / tall))
-                    _draw(axis, maps, scene, kind, method)
+                    _draw(axis, maps, scene, kind, method, pictures)
                 name = printable(titles[scene.name], round(17 * side))
                 figure.text(
                     (margin + (at + 0.5) * side) / inches, (below + 0.05) / tall, name, ha="center", parse_math=False
@@ -93,7 +100,62 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False) -> Captioned
     return CaptionedFigure(figure, _caption(maps, rows))
 
 
-def _rows(maps: Maps, errors: bool) -> list[tuple[str, str, str]]:
+@frozen(eq=False)
+class Pictures:
+    """What a metric shows of each map, all in one scale.
+
+    Parameters
+    ----------
+    what
+        Metric and ends of the scale, in words; empty if there is no metric.
+    values
+        (method, scene's name) -> (H, W).
+    most
+        What the last colour stands for.
+    """
+
+    what: str = ""
+    values: Mapping[tuple[str, str], NDArray[np.floating]] = {}
+    most: float = 1.0
+    is_signed: bool = False
+
+    @classmethod
+    def of(cls, maps: Maps, metric: Metric | None) -> "Pictures":
+        """Px of the pair end where those of errors do, other numbers at the largest.
+
+        Raises
+        ------
+        UserError
+            If the metric fails, or gives something that is no picture.
+        """
+        if metric is None or metric.picture is None:
+            return cls()
+        values = {}
+        for scene in maps.scenes:
+            for method in maps.methods:
+                found = maps.disparity.get((method, scene.name))
+                if found is not None and scene.ref in scene.truth:
+                    values[method, scene.name] = _picture(metric, scene, found)
+        known = np.concatenate([[0.0], *(array[np.isfinite(array)] for array in values.values())])
+        is_signed, unit = bool(known.min() < 0), f" {metric.unit}".rstrip()
+        most = coloring.WORST if metric.unit == "px" else float(np.abs(known).max()) or 1.0
+        ends = f"{-most:.4g} (brown) over 0 (white) to {most:.4g}{unit} (violet)" if is_signed else ""
+        what = f"{metric.name}, {ends or f'0 (black) to {most:.4g}{unit} and more (pale)'}, grey nothing to show"
+        return cls(what, values, most, is_signed)
+
+
+def _picture(metric: Metric, scene: Scene, found: NDArray[np.float32]) -> NDArray[np.floating]:
+    assert metric.picture is not None, "the caller has looked"  # noqa: S101
+    try:
+        values = np.asarray(metric.picture(map_in_region(scene, found, np.ones(found.shape, bool))), np.float64)
+    except Exception as error:
+        raise UserError(f"picture of metric {metric.name}: {failure(error)}") from error
+    if values.shape != found.shape:
+        raise UserError(f"picture of metric {metric.name} is {values.shape}, not {found.shape} numbers")
+    return values
+
+
+def _rows(maps: Maps, errors: bool, pictures: Pictures) -> list[tuple[str, str, str]]:
     """Every row as (kind, method, what the caption says)."""
     rows = [("view", "", "reference views")]
     if any(scene.ref in scene.truth for scene in maps.scenes):
@@ -104,10 +166,12 @@ def _rows(maps: Maps, errors: bool) -> list[tuple[str, str, str]]:
             rows.append(
                 ("error", method, f"its errors, 0 (black) to {coloring.WORST:g} px of the pair and more (pale)")
             )
+        if pictures.what:
+            rows.append(("picture", method, pictures.what))
     return rows
 
 
-def _draw(axis: Any, maps: Maps, scene: Scene, kind: str, method: str) -> None:
+def _draw(axis: Any, maps: Maps, scene: Scene, kind: str, method: str, pictures: Pictures) -> None:
     axis.axis("off")
     axis.set_anchor("N")
     truth, ends = scene.truth.get(scene.ref), coloring.disparity_ends(scene)
@@ -120,6 +184,9 @@ def _draw(axis: Any, maps: Maps, scene: Scene, kind: str, method: str) -> None:
         axis.imshow(coloring.disparity_colors(found, ends))
     if kind == "error" and found is not None and truth is not None:
         axis.imshow(coloring.error_colors(found, truth, scene.pair_steps))
+    if kind == "picture" and (method, scene.name) in pictures.values:
+        values = pictures.values[method, scene.name]
+        axis.imshow(coloring.picture_colors(values, pictures.most, pictures.is_signed))
     if not axis.images:
         axis.text(0.5, 0.5, "none", ha="center", va="center", transform=axis.transAxes)
 

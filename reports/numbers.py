@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from attrs import frozen
 
+from matbench.measures.metrics import Better
 from matbench.measures.statistics import Effect
 from matbench.reports import standing, tables
 from matbench.reports.content import Report
@@ -94,8 +95,9 @@ class Numbers:
         """The metric of a score at the first threshold."""
         return score.replace(AT, self.threshold)
 
-    def is_higher(self, metric: str) -> bool:
-        return metric in self.report.higher
+    def better(self, metric: str) -> Better:
+        """Which direction of a metric is."""
+        return self.report.better.get(metric, "lower")
 
     @cached_property
     def _tables(self) -> Mapping[tuple[str, str], pd.DataFrame]:
@@ -119,7 +121,7 @@ class Numbers:
 
         def make(metric: str, table: pd.DataFrame) -> dict[str, Entry]:
             means = tables.over_scenes(table, self.scope)
-            return entries(means, self._ranked, self.units[metric], self.is_higher(metric))
+            return entries(means, self._ranked, self.units[metric], self.better(metric))
 
         return self._by_metric(make)
 
@@ -128,8 +130,8 @@ class Numbers:
         """Metric -> region -> method -> entry with its mean rank."""
 
         def make(metric: str, table: pd.DataFrame) -> dict[str, Entry]:
-            ranks = standing.mean_ranks(table, self.scope, self.units[metric], self.is_higher(metric))
-            return entries(pd.Series(ranks, dtype=float), self._ranked, "%", higher=False)
+            ranks = standing.mean_ranks(table, self.scope, self.units[metric], self.better(metric))
+            return entries(pd.Series(ranks, dtype=float), self._ranked, "%")
 
         return self._by_metric(make)
 
@@ -146,7 +148,7 @@ class Numbers:
             out = []
             for scene, row in table.iterrows():
                 here = has[str(scene)]
-                found = entries(row.where(here), here, self.units[metric], self.is_higher(metric))
+                found = entries(row.where(here), here, self.units[metric], self.better(metric))
                 found |= {m: [None, str(status[m, scene]), 0] for m in self.scope.methods if (m, scene) in status}
                 out.append([found[m] for m in self.scope.methods])
             return out
@@ -155,8 +157,9 @@ class Numbers:
 
     @cached_property
     def differences(self) -> dict[str, dict[str, list[Difference]]]:
-        """Metric -> region -> differences between the ranked methods."""
-        found = iter(standing.differences(list(self._tables.values()), self.scope))
+        """Metric -> region -> differences between the ranked methods; between magnitudes where zero is best."""
+        merits = [table.abs() if self.better(m) == "zero" else table for (m, _), table in self._tables.items()]
+        found = iter(standing.differences(merits, self.scope))
         return self._by_metric(lambda *_: next(found))
 
     @cached_property
@@ -164,7 +167,7 @@ class Numbers:
         """Column of the cells (`COSTS`) -> method -> entry."""
         measures = {"seconds": tables.seconds, "peak_mb": tables.memory}
         return {
-            name: entries(measures[name](self.report.cells, self.scope), self._ranked, unit, higher=False)
+            name: entries(measures[name](self.report.cells, self.scope), self._ranked, unit)
             for name, (unit, _) in COSTS.items()
             if name in self.report.cells
         }
@@ -176,7 +179,7 @@ class Numbers:
         known = standing.references(self.scope)
         if reference is None:
             values = {m: means[m][0] for m in known if means[m][0] is not None}
-            reference = min(values, key=lambda m: -values[m] if self.is_higher(metric) else values[m], default=None)
+            reference = min(values, key=lambda m: tables.merit(values[m], self.better(metric)), default=None)
         effects = {d.method: d.effect for d in found if d.reference == reference}
         effects |= {d.reference: turned(d.effect) for d in found if d.method == reference}
         parts = [v for effect in effects.values() for v in _ends(effect)]
@@ -190,7 +193,7 @@ class Numbers:
                 "interval": f"{signed(effect.low)} .. {signed(effect.high)}" if np.isfinite(effect.low) else "–",
                 "size": signed(effect.size, 1),
                 "scenes": effect.scenes,
-                "verdict": words(effect.verdict, self.is_higher(metric)),
+                "verdict": words(effect.verdict, self.better(metric) == "higher"),
                 "bar": [round(3 + 94 * (v - left) / width, 2) for v in (*_ends(effect), 0.0)],
             }
             for method, effect in ((m, effects[m]) for m in self.scope.methods if m in effects)
@@ -204,7 +207,7 @@ class Numbers:
             "asked": list(self.scope.asked),
             "regions": self.regions,
             "units": self.units,
-            "higher": [m for m in self.units if self.is_higher(m)],
+            "better": {m: self.better(m) for m in self.units},
             "means": self.means,
             "ranks": self.ranks,
             "scenes": self.scenes,
@@ -219,9 +222,9 @@ class Numbers:
         }
 
 
-def entries(values: pd.Series, ranked: pd.Series, unit: str, higher: bool) -> dict[str, Entry]:
+def entries(values: pd.Series, ranked: pd.Series, unit: str, better: Better = "lower") -> dict[str, Entry]:
     """Method -> entry, with the places of the ranked methods."""
-    marks = tables.places(values[ranked], unit, higher)
+    marks = tables.places(values[ranked], unit, better)
     return {
         str(m): [None if pd.isna(v) else float(f"{v:.8g}"), tables.text(v, unit), int(marks.get(m, 0))]
         for m, v in values.items()

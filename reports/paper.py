@@ -13,6 +13,7 @@ import pandas as pd
 from attrs import frozen
 
 from matbench.errors import UserError, one_line, unknown
+from matbench.measures.metrics import Better
 from matbench.measures.statistics import FEW
 from matbench.reports import standing, tables
 from matbench.reports.tables import METRIC, REGION, REGIONS, Shared
@@ -33,8 +34,8 @@ class Sheet:
     ----------
     metric, unit
         What is shown.
-    higher
-        Is more of it better?
+    better
+        Which direction of it is better.
     texts
         One row for each method, over all scenes and in each: ``scene`` (`MEAN` for all), ``method``,
         every region, `RANK`; numbers as shown, `NONE` where there is none.
@@ -48,7 +49,7 @@ class Sheet:
 
     metric: str
     unit: str
-    higher: bool
+    better: Better
     texts: pd.DataFrame
     places: pd.DataFrame
     unranked: Mapping[str, str]
@@ -71,7 +72,7 @@ class Sheet:
     @property
     def caption(self) -> str:
         unit = f" ({self.unit})" if self.unit else ""
-        which = "higher" if self.higher else "lower"
+        which = "nearer to 0" if self.better == "zero" else self.better
         rank = f"{RANK.capitalize()}: the place by {self.metric} in {self.judged}, mean over scenes."
         return f"{self.metric}{unit} by region; {which} is better. Best in bold, second underlined. {rank}"
 
@@ -112,7 +113,7 @@ def sheet(
     results: pd.DataFrame,
     cells: pd.DataFrame,
     metric: str = METRIC,
-    higher: bool = False,
+    better: Better = "lower",
     regions: Sequence[str] = (),
     by_scene: bool = True,
 ) -> Sheet:
@@ -124,8 +125,8 @@ def sheet(
         The two tables of a run.
     metric
         What is shown.
-    higher
-        Is more of it better?
+    better
+        Which direction of it is better.
     regions
         The columns; if none are named, the field's own regions that were scored.
     by_scene
@@ -154,16 +155,15 @@ def sheet(
     }
     means = pd.DataFrame({r: tables.over_scenes(table, scope) for r, table in by_region.items()})
     judged = by_region[_judged(chosen)]
-    means[RANK] = pd.Series(standing.mean_ranks(judged, scope, unit, higher))
+    means[RANK] = pd.Series(standing.mean_ranks(judged, scope, unit, better))
     unranked = pd.Series([not scope.is_ranked(m) for m in scope.methods], index=list(scope.methods))
-    order = pd.DataFrame({"unranked": unranked, "by": means[_judged(chosen)]}).sort_values(
-        ["unranked", "by"], ascending=[True, not higher], kind="stable"
-    )
+    by = {"unranked": unranked, "merit": tables.merit(means[_judged(chosen)], better)}
+    order = pd.DataFrame(by).sort_values(list(by), kind="stable")
     blocks = {MEAN: means}
     for scene in scope.asked if by_scene and len(scope.asked) > 1 else ():
         block = pd.DataFrame({r: table.loc[scene] for r, table in by_region.items()})
         block = block.where(pd.Series({m: scene in scope.has[m] for m in scope.methods}), axis=0)
-        block[RANK] = pd.Series(standing.mean_ranks(judged.loc[[scene]], scope, unit, higher))
+        block[RANK] = pd.Series(standing.mean_ranks(judged.loc[[scene]], scope, unit, better))
         blocks[scene] = block
     texts, places = [], []
     for name, block in blocks.items():
@@ -173,7 +173,7 @@ def sheet(
         for column in rows.columns:
             kind = "%" if column == RANK else unit  # ranks have two decimals, too
             shown[column] = [tables.text(v, kind) for v in rows[column]]
-            found = tables.places(rows.loc[rivals, column], kind, higher and column != RANK)
+            found = tables.places(rows.loc[rivals, column], kind, "lower" if column == RANK else better)
             marks[column] = [int(found.get(m, 0)) for m in rows.index]
         texts.append(pd.DataFrame({"scene": name, "method": list(rows.index), **shown}))
         places.append(pd.DataFrame(marks))
@@ -185,7 +185,7 @@ def sheet(
     return Sheet(
         metric,
         unit,
-        higher,
+        better,
         pd.concat(texts, ignore_index=True),
         pd.concat(places, ignore_index=True),
         why,

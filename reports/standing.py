@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from attrs import frozen
 
+from matbench.measures.metrics import Better
 from matbench.measures.statistics import Effect, paired_effects
-from matbench.reports.tables import Shared, text
+from matbench.reports.tables import Shared, merit, text
 from matbench.spec import read_scene
 
 REFERENCES = 12
@@ -37,14 +38,14 @@ def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
     return groups.mean().where(groups.count().eq(groups.size(), axis=0))
 
 
-def mean_ranks(table: pd.DataFrame, scope: Shared, unit: str, higher: bool) -> dict[str, float]:
+def mean_ranks(table: pd.DataFrame, scope: Shared, unit: str, better: Better) -> dict[str, float]:
     """Method -> its rank (1 is best), averaged over `witnesses`; NaN if it is not ranked or lacks a value.
 
     Ranks are those of the numbers as shown; ties share a rank.
     """
     rows = witnesses(table, scope)
     shown = rows.map(lambda value: float(text(value, unit)) if pd.notna(value) else np.nan)
-    means = shown.rank(axis=1, ascending=not higher).mean(skipna=False)
+    means = merit(shown, better).rank(axis=1).mean(skipna=False)
     return {m: float(means.get(m, np.nan)) for m in scope.methods}
 
 

@@ -1,16 +1,19 @@
 """The tables of a run. Page, terminal and papers all take their numbers from here, so that they agree."""
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 import pandas as pd
 from attrs import frozen
 
+from matbench.measures.metrics import Better
 from matbench.regions import VIEW_REGIONS
 from matbench.spec import read_scene
 
 METRIC, REGION = "total_bad_1", "all"
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
 VIEWS = tuple(VIEW_REGIONS)
+Numbers = TypeVar("Numbers", float, pd.Series, pd.DataFrame)
 
 _NO_SCENES: frozenset[str] = frozenset()
 
@@ -189,7 +192,7 @@ def memory(cells: pd.DataFrame, scope: Shared) -> pd.Series:
     return pd.Series({m: wide.loc[list(scope.counted(m)), m].max(skipna=False) for m in scope.methods}, dtype=float)
 
 
-def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False) -> pd.DataFrame:
+def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, better: Better = "lower") -> pd.DataFrame:
     """Methods x means, best first by `metric` in `all`.
 
     Parameters
@@ -198,8 +201,8 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, hi
         The two tables of a run.
     metric
         The metric that is shown for every region.
-    higher
-        Is more of it better?
+    better
+        Which direction of it is better.
 
     Returns
     -------
@@ -216,8 +219,8 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, hi
     out["scenes"] = [len(scope.counted(m)) for m in scope.methods]
     out["asked"] = len(scope.asked)
     out["ranked"] = pd.Series([scope.is_ranked(m) for m in scope.methods], out.index, dtype=bool)
-    by = ["unranked", f"{metric} {REGION}"]
-    order = out.assign(unranked=~out["ranked"]).sort_values(by, ascending=[True, not higher], kind="stable")
+    by = {"unranked": ~out["ranked"], "merit": merit(out[f"{metric} {REGION}"], better)}
+    order = out.assign(**by).sort_values(list(by), kind="stable")
     return out.loc[order.index]
 
 
@@ -230,6 +233,15 @@ def none_scored(cells: pd.DataFrame) -> str:
     reason = first.get("reason")
     why = f": {reason}" if isinstance(reason, str) and reason else ""
     return f"no cell of this run has a score ({statuses}): {first['method']} on {first['scene']}{why}"
+
+
+def merit(values: Numbers, better: Better) -> Numbers:
+    """Numbers of which less is better, whichever of the values are.
+
+    >>> merit(-2.0, "lower"), merit(-2.0, "higher"), merit(-2.0, "zero")
+    (-2.0, 2.0, 2.0)
+    """
+    return -values if better == "higher" else abs(values) if better == "zero" else values
 
 
 def text(value: float, unit: str) -> str:
@@ -247,14 +259,13 @@ def text(value: float, unit: str) -> str:
     return f"{value:.4g}"
 
 
-def places(values: pd.Series, unit: str, higher: bool = False) -> pd.Series:
+def places(values: pd.Series, unit: str, better: Better = "lower") -> pd.Series:
     """1 for the best, 2 for the second best, else 0, by the numbers as shown: ties share a place.
 
     Nothing is marked where all are equal or only one has a value.
     """
-    sign = -1 if higher else 1
-    shown = [sign * float(text(v, unit)) if pd.notna(v) else float("nan") for v in values]
+    shown = [merit(float(text(v, unit)), better) if pd.notna(v) else float("nan") for v in values]
     if len({v for v in shown if v == v}) < 2:
         return pd.Series(0, values.index)
-    better = [sum(other < v for other in shown) if v == v else len(shown) for v in shown]
-    return pd.Series([b + 1 if b < 2 else 0 for b in better], values.index)
+    ahead = [sum(other < v for other in shown) if v == v else len(shown) for v in shown]
+    return pd.Series([a + 1 if a < 2 else 0 for a in ahead], values.index)

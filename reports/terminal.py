@@ -7,6 +7,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from matbench.measures.metrics import Better
 from matbench.measures.statistics import FEW
 from matbench.reports.tables import (
     METRIC,
@@ -33,7 +34,7 @@ _NAMED = 3  # scenes that are named where a method fails on many for the same re
 
 
 def tables(
-    results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, higher: bool = False, width: int = WIDTH
+    results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, better: Better = "lower", width: int = WIDTH
 ) -> list[Table]:
     """The summary, its regions over all views, every scene, and the failed cells; empty tables are left out.
 
@@ -46,15 +47,15 @@ def tables(
         heads |= {"avg all": "avg\nall", "seconds": "time"}
         if width < WIDTH:
             heads = {column: head for column, head in heads.items() if column.split()[-1] not in NARROW}
-        out.append(_summary(results, cells, scope, metric, higher, "by region", heads))
+        out.append(_summary(results, cells, scope, metric, better, "by region", heads))
         if note := timing_note(cells):
             out[-1].caption, out[-1].caption_justify = Text(note), "left"
         over_views = [r for r in summarised(results) if r in VIEWS]
         if per_scene(results, VIEWS[0], metric).notna().any(axis=None):
             heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in over_views}
-            out.append(_summary(results, cells, scope, metric, higher, "by the views that see a point", heads))
+            out.append(_summary(results, cells, scope, metric, better, "by the views that see a point", heads))
     if len(results):
-        out += _scenes(results, cells, scope, metric, higher, width)
+        out += _scenes(results, cells, scope, metric, better, width)
     bad = labelled(cells)
     bad = bad[bad["status"] != "ok"]
     if len(bad):
@@ -75,12 +76,12 @@ def _summary(
     cells: pd.DataFrame,
     scope: Shared,
     metric: str,
-    higher: bool,
+    better: Better,
     what: str,
     heads: dict[str, str],
 ) -> Table:
     """Methods x the columns of the summary that have a heading."""
-    rows, unit = summary(results, cells, metric, higher), metrics(results).get(metric, "%")
+    rows, unit = summary(results, cells, metric, better), metrics(results).get(metric, "%")
     count = f"{len(scope.scenes)} of {len(scope.asked)} scenes"
     hint = "; too few scenes to conclude" if scope.distinct < FEW else ""
     table = _plain(f"{metric} ({unit}) {what}, mean over {count}{hint}")
@@ -89,7 +90,7 @@ def _summary(
     units = {column: {"avg all": "px", "seconds": "s"}.get(column, unit) for column in heads}
     for column, head in heads.items():
         table.add_column(Text(f"{head}\n{units[column]}"), justify="right", no_wrap=True, vertical="top")
-    marks = {c: places(rows.loc[rows["ranked"], c], u, higher and metric in c) for c, u in units.items()}
+    marks = {c: places(rows.loc[rows["ranked"], c], u, better if metric in c else "lower") for c, u in units.items()}
     for number, (method, row) in enumerate(rows.iterrows(), 1):
         name = Text(str(method))
         if not row["ranked"]:
@@ -113,11 +114,11 @@ def _headings(methods: list[str], numbers: dict[str, int], room: int) -> list[st
 
 
 def _scenes(
-    results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str, higher: bool, width: int
+    results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str, better: Better, width: int
 ) -> list[Table]:
     """Scenes x methods, in as many tables as it takes to stay within the width."""
     room = min(width, WIDTH)
-    methods = [str(m) for m in summary(results, cells, metric, higher).index]
+    methods = [str(m) for m in summary(results, cells, metric, better).index]
     unit = metrics(results).get(metric, "%")
     numbers = {m: i for i, m in enumerate(methods, 1)}
     values = per_scene(results, REGION, metric).reindex(index=list(scope.asked), columns=methods)
@@ -136,7 +137,7 @@ def _scenes(
         for head in heads[start : start + at_once]:
             table.add_column(Text(head), justify="right", overflow="fold")
         for scene, row in values.iterrows():
-            marks = places(row[[m for m in methods if scene in scope.has[m]]], unit, higher)
+            marks = places(row[[m for m in methods if scene in scope.has[m]]], unit, better)
             shown_row = [
                 Text(status[m, str(scene)], style="italic")
                 if (m, scene) in status

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scene_files import Layers, write_pair, write_png
-from shown import LINES, METHOD, ROOT
+from shown import LINES, METHOD, OWN_FILES, ROOT
 
 from matbench.cli import main
 from matbench.comparison import Comparison
@@ -64,6 +64,7 @@ GROUPS: Mapping[str, Callable[[str], bool]] = {
     "check": lambda line: command(line) == "check",
     "bench": lambda line: command(line) == "bench",
     "prove": lambda line: command(line) == PROVE,
+    "script": lambda line: command(line) in OWN_FILES,
     "help": lambda line: words(line) == ["COMMAND", "--help"],
 }
 """The lines that are run in the same way: each belongs to one group."""
@@ -123,14 +124,16 @@ class Desk:
         self.folder, self.runs = folder, list[Path]()
         _own_scene(folder / "my_scene")
         write_pair(folder / "path/to/Adirondack-perfect", Layers(near=9.5, far=3.25))
+        for name, text in OWN_FILES.items():
+            (folder / name).write_text(text)
         (folder / "mine.py").write_text(METHOD)
         _own_program(folder / "mine")
         (folder / "algorithms").symlink_to(ROOT / "algorithms")
         draw = Comparison.report
 
-        def report(ready: Comparison, *given: Any) -> Path:
+        def report(ready: Comparison, *given: Any, **named: Any) -> Path:
             self.runs.append(ready.folder)
-            return draw(ready, *given) if len(self.runs) == 1 else ready.folder / "report.html"
+            return draw(ready, *given, **named) if len(self.runs) == 1 else ready.folder / "report.html"
 
         patch.setattr(Comparison, "report", report)
         patch.chdir(folder)

@@ -17,6 +17,13 @@ def blocks(language: str, page: str) -> list[str]:
 
 
 _ALONE = re.compile(r"^    ((?:.* && )?(?:matbench|pip|python3?)(?: .*)?)$", re.M)
+
+
+def commands(page: str) -> list[str]:
+    """The commands of a page that stand in lines of their own, in order."""
+    return _ALONE.findall(TEXT[page])
+
+
 _WITHIN = re.compile(r"`(matbench [^`]+)`")
 LINES = list(
     dict.fromkeys(
@@ -29,4 +36,6 @@ LINES = list(
 METHOD = blocks("python", "README.md")[0]
 SCENE = blocks("toml", "docs/guides/own-scene.md")[0]
 SCRIPT = blocks("python", "docs/guides/own-method.md")[1]
+OWN_FILES = dict(re.findall(r"`(\w+\.py)`:\n\n```python\n(.*?)```", TEXT["docs/guides/extending.md"], re.DOTALL))
+"""The files that the page on extending has one write: name -> content."""
 CI_SCRIPT = blocks("python", "docs/guides/ci.md")[0]

@@ -44,7 +44,7 @@ def ablate(
     from matbench.plans.plan import methods
     from matbench.results import ablation
 
-    check_metric(options.metric)
+    check_metric(options.metric, options.plugin)
     algorithms: list[str] = [selector]
     if selector.endswith(".toml"):
         algorithms, listed = comparison.read_request(Path(selector))
@@ -54,7 +54,7 @@ def ablate(
     ready = comparison.prepare(
         algorithms,
         scene,
-        settings=evolve(options.settings, volumes=is_of_volumes(options.metric)),
+        settings=evolve(options.settings, volumes=is_of_volumes(options.metric, options.plugin)),
         out=options.out,
         seed=options.seeds,
         plugin=options.plugin,

@@ -231,7 +231,9 @@ class _Judging:
         self.output.document["work"] = {"counters": now, "changes": changed}
         for line in changed:
             self.output.say(f"other work than before: {line}")
-        if not changed:
+        if changed:
+            self.output.say("if that is meant: matbench bench --update stores what is counted now")
+        else:
             self.output.say(f"work: {sum(map(len, now.values()))} counters of {len(now)} methods are what they were")
         return REGRESSION if changed else DONE
 

@@ -93,7 +93,10 @@ def _read(names: Sequence[str], plugin: Sequence[Path]) -> tuple[list[Method], l
             if one.name.endswith(".py"):
                 path = Path(one.name).resolve()
                 files.append(path)
-                selectors += [spec.label(found, one.options) for found in plugins.from_file(path)]
+                held = plugins.from_file(path)
+                if not held:
+                    raise UserError(f"{name} holds no method: a class with solve(self, scene, context)")
+                selectors += [spec.label(found, one.options) for found in held]
             else:
                 selectors.append(str(one))
     return chosen(selectors, list(dict.fromkeys(files))), list(dict.fromkeys(files))

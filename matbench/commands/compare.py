@@ -86,7 +86,7 @@ def compare(
     from matbench import comparison
     from matbench.commands import running
 
-    check_metric(options.metric)
+    check_metric(options.metric, options.plugin)
     if row is not None and record is None:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
@@ -97,7 +97,7 @@ def compare(
         settings=evolve(
             options.settings,
             record=None if record is None else RecordOption.of(record, row),
-            volumes=volumes or is_of_volumes(options.metric),
+            volumes=volumes or is_of_volumes(options.metric, options.plugin),
         ),
         out=options.out,
         seed=options.seeds,

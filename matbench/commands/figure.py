@@ -16,6 +16,7 @@ from matbench.errors import UserError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from matbench.measures.metrics import Metric
     from matbench.plans.plan import Cell
     from matbench.reports.paper_figure import CaptionedFigure
     from matbench.runs.store import Store
@@ -91,7 +92,7 @@ def slice_(
         raise UserError(
             f"{chosen.method.algorithm} is in a file of its own: add --plugin {shlex.join(plan.plugin_files)}"
         )
-    scene = _scene(chosen, data, console)
+    scene = _scene(chosen, data, plugin, console)
     if wanted.rows and wanted.rows[0] >= scene.height:
         raise UserError(f"row {row} of {scene.name}: 0 to {scene.height - 1} is possible")
     stem = _stem(out, run, f"slice-{chosen}")
@@ -123,9 +124,13 @@ def maps(
         Parameter(name=["--scene", "-s"], consume_multiple=True, negative="", help="Scene or pattern; default all."),
     ] = None,
     errors: Annotated[bool, Parameter(negative="", help="Below each map its errors.")] = False,
+    metric: Annotated[
+        str | None, Parameter(name=["--metric", "-m"], help="Below each map the picture of a metric that has one.")
+    ] = None,
     out: Out = None,
     width: Width = "column",
     data: Data = None,
+    plugin: Plugins = [],  # noqa: B006 -- never changed
 ) -> int:
     """Draw reference views, true disparities and the methods' maps, one scene a column (the paper's figure 3).
 
@@ -137,6 +142,8 @@ def maps(
 
     `matbench figure maps runs/1a2b3c4d -s 'synthetic/*' -a materiality --errors --width page`
 
+    `matbench figure maps runs/1a2b3c4d -m bias`
+
     Parameters
     ----------
     run
@@ -145,7 +152,7 @@ def maps(
     from matbench.reports import map_figure
     from matbench.runs.store import Store
 
-    store, console = Store(run), Console()
+    store, console, pictured = Store(run), Console(), _pictured(metric, plugin)
     cells = store.plan().cells
     methods = list(dict.fromkeys(str(c.method) for c in cells))
     names = list(dict.fromkeys(c.scene for c in cells))
@@ -159,7 +166,7 @@ def maps(
         for cell in chosen:
             if cell.scene not in scenes:
                 status.update(f"{cell.scene}: reading")
-                scenes[cell.scene] = _scene(cell, data, console)
+                scenes[cell.scene] = _scene(cell, data, plugin, console)
             known = scenes[cell.scene]
             stored = _stored(store, cell, known)
             if stored is not None and stored.shape == (known.height, known.width):
@@ -167,9 +174,26 @@ def maps(
     if not found:
         raise UserError(f"no disparity map to draw: {_lacking(store, chosen)}")
     with console.status("drawing"):
-        drawn = map_figure.draw(map_figure.Maps(tuple(scenes[n] for n in names), tuple(methods), found), width, errors)
+        shown = map_figure.Maps(tuple(scenes[n] for n in names), tuple(methods), found)
+        drawn = map_figure.draw(shown, width, errors, pictured)
         _write(drawn, stem, console)
     return DONE
+
+
+def _pictured(name: str | None, plugin: "Sequence[Path]") -> "Metric | None":
+    """The metric whose picture is drawn."""
+    from matbench.measures.metrics import Metric
+    from matbench.plans.plugins import using
+    from matbench.results import scores
+
+    if name is None:
+        return None
+    with using(plugin):
+        found, every = scores.metric_named(name), scores.metrics()
+    if not (isinstance(found, Metric) and found.picture is not None):
+        have = ", ".join(m.name for m in every if isinstance(m, Metric) and m.picture is not None)
+        raise UserError(f"metric {name} has no picture: {have} have one")
+    return found
 
 
 def _one(cells: "Sequence[Cell]", part: str | None) -> "Cell":
@@ -196,12 +220,12 @@ def _matching(kind: str, names: list[str], wanted: list[str] | None) -> list[str
     return [n for n in names if n in exact or any(one in n or fnmatchcase(n, one) for one in rest)]
 
 
-def _scene(cell: "Cell", data: Path | None, console: Console) -> "Scene":
+def _scene(cell: "Cell", data: Path | None, plugin: "Sequence[Path]", console: Console) -> "Scene":
     """The scene of a cell; refused if it has changed since the run."""
     from matbench.scenes.catalogue import load_scene
 
     with console.status(f"{cell.scene}: reading"):
-        scene = load_scene(cell.scene, data)
+        scene = load_scene(cell.scene, data, plugin)
     if scene.digest != cell.scene_digest:
         raise UserError(f"{cell.scene} is not what it was in the run: its images or its options' meaning have changed")
     return scene

@@ -60,6 +60,11 @@ def list_(
 
 def known(data: Path | None = None, files: Sequence[Path] = ()) -> dict[str, Any]:
     """Everything that can be named on the command line, as plain values for JSON."""
+    with plugins.using(files):
+        return _known(data, files)
+
+
+def _known(data: Path | None, files: Sequence[Path]) -> dict[str, Any]:
     return {
         "algorithms": {name: _algorithm(plugin) for name, plugin in sorted(plugins.algorithms(files).items())},
         "scenes": {name: _scene(found) for name, found in listings(data).items()},

@@ -1,14 +1,16 @@
 """Options that several commands share."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 from attrs import field, frozen
 from cyclopts import Parameter
 
-from matbench.errors import UserError, unknown
+from matbench.errors import UserError
 from matbench.plans import limits
+from matbench.plans.plugins import using
 from matbench.plans.settings import Only, Settings
 
 Data = Annotated[
@@ -18,7 +20,10 @@ Data = Annotated[
 Plugins = Annotated[
     list[Path],
     Parameter(
-        name="--plugin", negative="", show_default=False, help="Python file with methods of your own; may be repeated."
+        name="--plugin",
+        negative="",
+        show_default=False,
+        help="Python file with methods, scenes or metrics of your own; may be repeated.",
     ),
 ]
 
@@ -119,17 +124,17 @@ def whole(name: str, text: str) -> int:
     return int(text)
 
 
-def check_metric(metric: str) -> None:
-    """Raise UserError where no metric has that name."""
+def check_metric(metric: str, files: Sequence[Path] = ()) -> None:
+    """Raise UserError where no metric has that name, in the users' own files neither."""
     from matbench.results import scores
 
-    names = [m.name for m in scores.metrics()]
-    if metric not in names:
-        raise unknown("metric", metric, names)
+    with using(files):
+        scores.metric_named(metric)
 
 
-def is_of_volumes(metric: str) -> bool:
+def is_of_volumes(metric: str, files: Sequence[Path] = ()) -> bool:
     """Does this metric score volumes? Then they must be kept."""
     from matbench.results import scores
 
-    return scores.of_volumes(metric)
+    with using(files):
+        return scores.of_volumes(metric)

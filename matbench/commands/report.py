@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from matbench.commands.console import DONE, Console
+from matbench.commands.options import Plugins
 from matbench.errors import UserError
 
 app = App(
@@ -42,6 +43,7 @@ def report(
         Parameter(consume_multiple=True, negative="", help="Its columns; default the field's own five."),
     ] = None,
     scenes: Annotated[bool, Parameter(help="After the means, every scene.")] = True,
+    plugin: Plugins = [],  # noqa: B006 -- never changed
 ) -> int:
     """Write methods x regions: means, mean ranks and every scene; best and second marked.
 
@@ -51,6 +53,7 @@ def report(
         Folder of a finished run.
     """
     from matbench.files.writing import write_text
+    from matbench.plans.plugins import using
     from matbench.reports import paper, terminal
     from matbench.results import scores
 
@@ -62,11 +65,17 @@ def report(
     if out is not None and not out.parent.is_dir():
         raise UserError(f"folder {str(out.parent)!r} of --out does not exist")
     results, cells = paper.read_run(run)
-    higher = any(m.name == metric and m.better == "higher" for m in scores.metrics())
-    made = paper.sheet(results, cells, metric, higher, region or (), scenes)
+    with using(plugin):
+        known = {m.name: m.better for m in scores.metrics()}
+    if metric not in known and (results["metric"] == metric).any():
+        raise UserError(
+            f"nothing offers {metric}, so nobody knows what is better: add --plugin with the file that has it"
+        )
+    better = known.get(metric, "lower")
+    made = paper.sheet(results, cells, metric, better, region or (), scenes)
     console = Console()
     if format is None:
-        for table in terminal.tables(results, cells, metric, higher, console.width):
+        for table in terminal.tables(results, cells, metric, better, console.width):
             console.print(table)
         return DONE
     text = paper.formatted(made, format)

@@ -16,7 +16,9 @@ from matbench.commands.console import DONE, FAILED, INTERRUPTED, Console
 from matbench.commands.options import Options
 from matbench.commands.progress import Progress
 from matbench.comparison import Comparison
+from matbench.measures.metrics import Better
 from matbench.plans.limits import crowded
+from matbench.plans.plugins import using
 from matbench.reports import curves, tables, terminal
 from matbench.reports import switches as effects
 from matbench.results import scores
@@ -134,6 +136,19 @@ def publish(
     kept
         Tables that lie there with their page, and are what would be written (`Comparison.kept`).
     """
+    with using(ready.files):
+        return _publish(ready, metric, is_ablation, voice, stopped, kept, say_paths)
+
+
+def _publish(
+    ready: Comparison,
+    metric: str,
+    is_ablation: bool,
+    voice: Voice,
+    stopped: bool,
+    kept: Tables | None,
+    say_paths: bool,
+) -> Any:
     with voice.busy("scoring"):
         found = ready.tables() if kept is None else kept
         results, cells = found.results, found.cells
@@ -196,7 +211,7 @@ def document(
             "avg": _number(row["avg all"]),
             "seconds": _number(row["seconds"]),
         }
-        for method, row in tables.summary(results, cells, metric, _higher(metric)).iterrows()
+        for method, row in tables.summary(results, cells, metric, _better(metric)).iterrows()
     ]
     bad = tables.labelled(cells)
     bad = bad[bad["status"] != "ok"]
@@ -221,12 +236,8 @@ def _plain(value: Any) -> Any:
     return "" if isinstance(value, float) and math.isnan(value) else value
 
 
-def _better(metric: str) -> str:
-    return next(m.better for m in scores.metrics() if m.name == metric)
-
-
-def _higher(metric: str) -> bool:
-    return _better(metric) == "higher"
+def _better(metric: str) -> Better:
+    return scores.metric_named(metric).better
 
 
 def _say_failed(cells: Any) -> None:
@@ -289,7 +300,7 @@ def _measured(results: Any, metric: str, voice: Voice) -> str:
 
 
 def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
-    for table in terminal.tables(results, cells, metric, _higher(metric), console.width):
+    for table in terminal.tables(results, cells, metric, _better(metric), console.width):
         console.print(table)
     for table in curves.terminal(sweeps, metric):
         console.print(table)

@@ -3,13 +3,14 @@
 import os
 import re
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
 
 from matbench.commands.console import DONE, FAILED, Console
-from matbench.commands.options import Data
+from matbench.commands.options import Data, Plugins
 from matbench.errors import UserError
 
 app = App(
@@ -36,6 +37,7 @@ def show(
     ] = None,
     record: Annotated[bool, Parameter(negative="", help="Also write a recording beside it, for `view`.")] = False,
     data: Data = None,
+    plugin: Plugins = [],  # noqa: B006 -- never changed
 ) -> int:
     """Draw a contact sheet of a scene: its views, one row in all of them, its truth, its regions.
 
@@ -52,6 +54,13 @@ def show(
     names
         Scenes or patterns, as for `compare`; the path of a folder is a scene of your own.
     """
+    from matbench.plans.plugins import using
+
+    with using(plugin):
+        return _show(names, out, record, data)
+
+
+def _show(names: Sequence[str], out: Path | None, record: bool, data: Path | None) -> int:
     from matbench.files.writing import write_bytes
     from matbench.reports.contact_sheet import contact_sheet
     from matbench.scenes.catalogue import load_scene, select
@@ -99,7 +108,7 @@ def _file_name(scene: str) -> str:
 
 
 @app.command(help_epilogue="")
-def check(name: str, *, data: Data = None) -> int:
+def check(name: str, *, data: Data = None, plugin: Plugins = []) -> int:  # noqa: B006 -- never changed
     """Say in words what is wrong with a scene: files, order of views, shift, rows, and whether truth explains them.
 
     Order, shift and rows are measured on matched features; truth by warping: the other views,
@@ -118,6 +127,13 @@ def check(name: str, *, data: Data = None) -> int:
     name
         The folder of a scene of your own, or the name of any scene.
     """
+    from matbench.plans.plugins import using
+
+    with using(plugin):
+        return _check(name, data)
+
+
+def _check(name: str, data: Path | None) -> int:
     from rich.text import Text
 
     from matbench.datasets.folder import describe

@@ -10,8 +10,9 @@ from cyclopts import App, Parameter
 
 from matbench.commands import running
 from matbench.commands.console import DONE, FAILED, Console
-from matbench.commands.options import Data, check_metric
+from matbench.commands.options import Data, Plugins, check_metric
 from matbench.errors import UserError
+from matbench.plans.plugins import using
 from matbench.reports.tables import METRIC
 from matbench.rescoring import join, open_run
 from matbench.results import archive, freshness
@@ -40,13 +41,21 @@ def score(
     /,
     *,
     data: Data = None,
+    plugin: Plugins = [],  # noqa: B006 -- never changed
     out: Annotated[
         Path | None, Parameter(help="New run folder for several runs, or for what an archive holds.")
     ] = None,
-    partial: Annotated[bool, Parameter(negative="", help="Leave out scenes that are missing or have changed.")] = False,
+    partial: Annotated[
+        bool,
+        Parameter(
+            negative="", help="Leave out scenes that are missing or have changed, and metrics that nothing offers."
+        ),
+    ] = False,
     metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = METRIC,
 ) -> int:
     """Compute all scores from the stored maps; write tables and report anew, and say whether the scores changed.
+
+    A run folder may come from anywhere: of its plug-in files only those are read that are given by --plugin.
 
     The scenes are needed. An archive is checked file by file, and not changed. The status is 1 if its scores
     are not what its maps give.
@@ -56,7 +65,7 @@ def score(
     run
         Run folder or exported archive; several are joined, where scenes and code are the same.
     """
-    check_metric(metric)
+    check_metric(metric, plugin)
     console = Console()
     for one in run:
         if not one.exists():
@@ -72,13 +81,13 @@ def score(
     with tempfile.TemporaryDirectory(prefix="matbench-") as aside:
         folders = [_folder(one, Path(aside) / f"{number}", console) for number, one in enumerate(run)]
         if len(folders) > 1 and out is not None:
-            return _score(join(folders, out).folder, data, partial, metric, console, None)
+            return _score(join(folders, out).folder, data, plugin, partial, metric, console, None)
         claimed = None if run[0].is_dir() else _claimed(folders[0])
         if out is not None and claimed is not None:
             out.parent.mkdir(parents=True, exist_ok=True)
             archive.unpack(run[0], out)
             folders = [out]
-        return _score(folders[0], data, partial, metric, console, claimed)
+        return _score(folders[0], data, plugin, partial, metric, console, claimed)
 
 
 def _folder(run: Path, aside: Path, console: Console) -> Path:
@@ -93,11 +102,19 @@ def _folder(run: Path, aside: Path, console: Console) -> Path:
 def _claimed(folder: Path) -> str:
     """The digest of the scorer that made an archive's tables, as the archive says."""
     made = freshness.made(Store(folder))
-    return made.scorer if made else "an unknown one"
+    return made.by if made else "an unknown one"
 
 
-def _score(folder: Path, data: Path | None, partial: bool, metric: str, console: Console, claimed: str | None) -> int:
-    ready, missing = open_run(folder, data, partial)
+def _score(
+    folder: Path,
+    data: Path | None,
+    plugin: Sequence[Path],
+    partial: bool,
+    metric: str,
+    console: Console,
+    claimed: str | None,
+) -> int:
+    ready, missing = open_run(folder, data, partial, plugin)
     for name, why in missing.items():
         console.say(f"without {name}: {why}")
     before = _read(folder / "results.csv")
@@ -115,8 +132,10 @@ def _score(folder: Path, data: Path | None, partial: bool, metric: str, console:
         console.say(f"  {line}")
     if claimed is None:
         return DONE
-    if claimed != freshness.digest():
-        console.say(f"the archive's scores are by another scorer ({claimed}, here {freshness.digest()})")
+    with using(plugin):
+        here = freshness.by()
+    if claimed != here:
+        console.say(f"the archive's scores are by another scorer ({claimed}, here {here})")
     return FAILED
 
 

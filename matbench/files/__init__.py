@@ -1,1 +1,4 @@
-"""Files on disk and over the network, read and written with care; imports nothing of the harness but its errors."""
+"""Files on disk and over the network, read and written with care.
+
+Imports the basic modules only.
+"""

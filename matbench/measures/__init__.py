@@ -1,1 +1,4 @@
-"""Numbers about maps and volumes: metrics, prediction, statistics; imports the words of the root and nothing else."""
+"""Numbers about disparity maps and volumes: metrics, prediction, statistics.
+
+Imports the basic modules and `files`.
+"""

@@ -2,16 +2,20 @@
 
 import warnings
 from collections.abc import Callable, Iterable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
+from attrs.validators import in_
 from numpy.typing import NDArray
 
 from matbench.errors import failure
+from matbench.scene import Scene
 
 Errors = NDArray[np.float64]
+Better = Literal["lower", "higher", "zero"]
+"""Which numbers are better: lower ones, higher ones, or those that are nearer to zero."""
 
 TIE = 1e-4
 """Px. An error this little above a threshold is a tie, and a tie is not bad."""
@@ -26,21 +30,63 @@ class Metric:
     name
         How tables and the command line call it.
     unit
-        ``"%"`` of the region's pixels, or ``"px"`` of the field's pair.
+        ``"%"`` of the region's pixels, ``"px"`` of the field's pair, or empty for a plain number.
     better
-        Which direction is better.
+        ``"lower"``, ``"higher"``, or ``"zero"`` for a signed number, of which what is nearer to zero is better.
     about
         What it is, in one line.
     compute
-        (pixels,) absolute errors in px of the pair, NaN where the method has no answer, at least
-        one pixel -> the value; NaN where it has none. It must not write to its argument.
+        What `takes` says, of at least one pixel -> the value; NaN where it has none. It must not write to its
+        argument.
+    takes
+        ``"absolute"``: (pixels,) float64 absolute errors in px of the pair, NaN where the method has no answer.
+        ``"signed"``: the same with their signs, estimate less truth: positive is too near.
+        ``"map"``: a `MapInRegion`, for whatever depends on where pixels lie.
+    picture
+        A `MapInRegion` of all pixels with known truth -> (H, W) numbers in `unit`, NaN where there is nothing to
+        show: what ``matbench figure maps --metric`` draws. None if there is nothing to look at.
     """
 
     name: str
-    unit: Literal["%", "px"]
-    better: Literal["lower", "higher"]
+    unit: Literal["%", "px", ""]
+    better: Better
     about: str
-    compute: Callable[[Errors], float]
+    compute: Callable[[Any], float]
+    takes: Literal["absolute", "signed", "map"] = field(
+        default="absolute", validator=in_(("absolute", "signed", "map"))
+    )
+    picture: "Callable[[MapInRegion], NDArray[np.floating]] | None" = None
+
+
+@frozen(eq=False)
+class MapInRegion:
+    """A whole disparity map, and the region in which it is judged: what a spatial metric is given. Read-only.
+
+    Parameters
+    ----------
+    scene
+        The scene, with views, truth and range.
+    estimate
+        (H, W) float32 map of the reference view, pixels per view step; NaN where the method has no answer.
+    mask
+        (H, W) bool: the region's pixels with known truth. What lies outside may be looked at, but does not count.
+    """
+
+    scene: Scene
+    estimate: NDArray[np.float32]
+    mask: NDArray[np.bool_]
+
+    @property
+    def truth(self) -> NDArray[np.float32]:
+        """(H, W) float32 true map, pixels per view step; NaN where it is unknown."""
+        return self.scene.truth[self.scene.ref]
+
+    @cached_property
+    def error(self) -> Errors:
+        """(H, W) float64 signed errors in px of the pair, also outside of `mask`; NaN where estimate or truth is."""
+        found = signed_error_map(self.estimate, self.truth, self.scene.pair_steps)
+        found.setflags(write=False)
+        return found
 
 
 def error_map(estimate: NDArray[np.float32], truth: NDArray[np.float32], pair_steps: float) -> Errors:
@@ -57,9 +103,14 @@ def error_map(estimate: NDArray[np.float32], truth: NDArray[np.float32], pair_st
     -------
     (H, W) float64, pixels of the pair; NaN where either is unknown.
     """
+    return np.abs(signed_error_map(estimate, truth, pair_steps))
+
+
+def signed_error_map(estimate: NDArray[np.float32], truth: NDArray[np.float32], pair_steps: float) -> Errors:
+    """Estimate less truth, as `error_map`: positive where the estimate is too near."""
     known = np.isfinite(estimate) & np.isfinite(truth)
     error = np.full(truth.shape, np.nan)
-    error[known] = np.abs(estimate[known].astype(np.float64) - truth[known].astype(np.float64)) * pair_steps
+    error[known] = (estimate[known].astype(np.float64) - truth[known].astype(np.float64)) * pair_steps
     return error
 
 
@@ -124,6 +175,15 @@ METRICS: tuple[Metric, ...] = (
     ),
     Metric("invalid", "%", "lower", "not answered", invalid),
     Metric("avg", "px", "lower", "mean error of answered pixels", average),
+    Metric(
+        "bias",
+        "px",
+        "zero",
+        "mean signed error of answered pixels: positive is too near",
+        average,
+        takes="signed",
+        picture=lambda found: found.error,
+    ),
     Metric("rms", "px", "lower", "root mean square error of answered pixels", root_mean_square),
     *(
         Metric(
@@ -144,6 +204,7 @@ def score(
     mask: NDArray[np.bool_],
     pair_steps: float,
     metrics: Iterable[Metric] = METRICS,
+    scene: Scene | None = None,
 ) -> dict[str, float]:
     """Every metric over one region.
 
@@ -156,6 +217,8 @@ def score(
         (H, W) bool, the region.
     pair_steps
         View steps in the field's pair.
+    scene
+        What the map is of, for metrics that take a map.
 
     Returns
     -------
@@ -164,13 +227,31 @@ def score(
     Raises
     ------
     ValueError
-        If the three arrays differ in shape.
+        If the three arrays differ in shape, or a metric takes a map and there is no scene.
     """
     if not estimate.shape == truth.shape == mask.shape:
         raise ValueError(f"estimate is {estimate.shape}, truth {truth.shape}, region {mask.shape}: they must agree")
-    errors = error_map(estimate, truth, pair_steps)[mask & np.isfinite(truth)]
-    errors.setflags(write=False)
-    return {metric.name: value_of(metric, errors, errors.size) for metric in metrics}
+    known = mask & np.isfinite(truth)
+    signed = signed_error_map(estimate, truth, pair_steps)[known]
+    given: dict[str, Any] = {"absolute": np.abs(signed), "signed": signed}
+    for errors in given.values():
+        errors.setflags(write=False)
+    if scene is not None:
+        given["map"] = map_in_region(scene, estimate, known)
+    values = {}
+    for metric in metrics:
+        if metric.takes not in given:
+            raise ValueError(f"metric {metric.name} takes a map: give its scene")
+        values[metric.name] = value_of(metric, given[metric.takes], signed.size)
+    return values
+
+
+def map_in_region(scene: Scene, estimate: NDArray[np.float32], mask: NDArray[np.bool_]) -> MapInRegion:
+    """What a metric of the whole map is given; of the mask, the pixels with known truth."""
+    arrays = np.where(np.isfinite(estimate), estimate, np.float32(np.nan)), mask & np.isfinite(scene.truth[scene.ref])
+    for array in arrays:
+        array.setflags(write=False)
+    return MapInRegion(scene, *arrays)
 
 
 def value_of(metric: Any, argument: Any, pixels: int) -> float:

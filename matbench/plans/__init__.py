@@ -1,1 +1,4 @@
-"""What is to be done: plug-ins found, requests read, cells planned; imports the words of the root and nothing else."""
+"""What is to be done: plug-ins found, requests read, cells planned.
+
+Imports the basic modules and `files`.
+"""

@@ -3,12 +3,14 @@
 import inspect
 import os
 import re
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Literal
 
 from attrs import frozen
@@ -84,32 +86,101 @@ def snake_case(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
-def from_file(path: Path) -> Mapping[str, Plugin]:
-    """The methods in a user's own file: every public, concrete class defined there that has a `solve`.
+def from_file(path: Path, group: Group = "algorithms") -> Mapping[str, Plugin]:
+    """What a user's own file offers of one group; see `own_metrics` for its metrics.
 
-    A class is named after itself in snake case, or by its attribute `name`.
+    Every public, concrete class defined there is a method if it has a `solve`, and a dataset if it has `listings` and
+    `load`. A class is named after itself in snake case, or by its attribute `name`.
 
     Raises
     ------
     UserError
-        If the file is missing, fails to import, or holds no method.
+        If the file is missing, fails to import, or holds no plug-in of any kind.
     """
+    module = _module_of(path)
+    classes = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module.__name__]
+    found: dict[str, Plugin] = {}
+    is_any = bool(_metrics_in(module))
+    for cls in classes:
+        kinds = [kind for kind, wanted in _MARKS.items() if all(callable(getattr(cls, name, None)) for name in wanted)]
+        if not kinds or cls.__name__.startswith("_") or inspect.isabstract(cls):
+            continue
+        is_any = True
+        given = vars(cls).get("name")
+        name = given if isinstance(given, str) else snake_case(cls.__name__)
+        if not re.fullmatch(r"[A-Za-z0-9_.-]+", name):
+            kind = "method" if "algorithms" in kinds else "dataset"
+            raise UserError(f"{path}: {kind} name {name!r} may hold letters, digits and _ . - only")
+        if group in kinds:
+            found[name] = Plugin(name, str(path), cls)
+    if not is_any:
+        raise UserError(
+            f"plug-in file {str(path)!r} holds no method (a class with solve(self, scene, context)), no dataset "
+            "(a class with listings and load) and no Metric"
+        )
+    return found
+
+
+_MARKS: Mapping[Group, tuple[str, ...]] = {"algorithms": ("solve",), "datasets": ("listings", "load")}
+
+
+def own_metrics(path: Path) -> tuple[Any, ...]:
+    """The metrics in a user's own file: every one that stands there under a public name, alone or in a list.
+
+    Raises
+    ------
+    UserError
+        As `from_file`.
+    """
+    from_file(path)
+    return _metrics_in(_module_of(path))
+
+
+def _metrics_in(module: ModuleType) -> tuple[Any, ...]:
+    """What looks like a metric; whoever scores sees whether it is one."""
+    public = [value for name, value in vars(module).items() if not name.startswith("_")]
+    every = [one for value in public for one in (value if isinstance(value, list | tuple) else [value])]
+    kinds = [one for one in every if not isinstance(one, type) and callable(getattr(one, "compute", None))]
+    return tuple({id(one): one for one in kinds if hasattr(one, "better")}.values())
+
+
+def _module_of(path: Path) -> ModuleType:
     if not os.path.isfile(path):  # noqa: PTH113 (False where a folder may not be entered, too)
         raise UserError(f"plug-in file {str(path)!r} does not exist or may not be read: give the path of a Python file")
-    module = import_file(path)
-    classes = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module.__name__]
-    found = {}
-    for cls in classes:
-        is_hidden = cls.__name__.startswith("_") or inspect.isabstract(cls)
-        if callable(getattr(cls, "solve", None)) and not is_hidden:
-            given = vars(cls).get("name")
-            name = given if isinstance(given, str) else snake_case(cls.__name__)
-            if not re.fullmatch(r"[A-Za-z0-9_.-]+", name):
-                raise UserError(f"{path}: method name {name!r} may hold letters, digits and _ . - only")
-            found[name] = Plugin(name, str(path), cls)
-    if not found:
-        raise UserError(f"plug-in file {str(path)!r} holds no method: a class with solve(self, scene, context)")
-    return found
+    return import_file(path)
+
+
+_used: ContextVar[tuple[Path, ...]] = ContextVar("plug-in files", default=())
+
+
+@contextmanager
+def using(files: Iterable[str | Path]) -> Iterator[None]:
+    """Have scenes and metrics of users' own files found as the installed ones are, as long as the block lasts.
+
+    They are loaded by name in many places, in other processes, too. Methods need no such block: whoever looks for
+    them names the files.
+
+    Raises
+    ------
+    UserError
+        If a file cannot be used, or takes the name of another dataset.
+    """
+    token = _used.set(tuple(dict.fromkeys(Path(file).resolve() for file in files)))
+    try:
+        datasets()
+        yield
+    finally:
+        _used.reset(token)
+
+
+def used() -> tuple[Path, ...]:
+    """The files of the block that `using` has begun."""
+    return _used.get()
+
+
+def datasets() -> dict[str, Plugin]:
+    """All datasets by name: the installed ones and those in the files that are `used`."""
+    return _with_files("datasets", used())
 
 
 def algorithms(files: Iterable[Path] = ()) -> dict[str, Plugin]:
@@ -120,9 +191,13 @@ def algorithms(files: Iterable[Path] = ()) -> dict[str, Plugin]:
     UserError
         If a file cannot be used, or takes the name of another method.
     """
-    found = dict(installed("algorithms"))
+    return _with_files("algorithms", files)
+
+
+def _with_files(group: Group, files: Iterable[Path]) -> dict[str, Plugin]:
+    found = dict(installed(group))
     for path in files:
-        for name, plugin in from_file(path).items():
+        for name, plugin in from_file(path, group).items():
             if name in found and found[name].source != plugin.source:
                 raise UserError(
                     f"{path}: the name {name!r} is taken by {found[name].source}; give the class another name"

@@ -1,1 +1,4 @@
-"""Recordings for the rerun viewer. Imports only the root modules, `measures` and `plans`."""
+"""Recordings for the rerun viewer.
+
+Imports the basic modules, `files`, `measures` and `plans`.
+"""

@@ -75,6 +75,14 @@ def truth_colors(truth: NDArray[np.floating], ends: tuple[float, float], levels:
     return picture
 
 
+def picture_colors(values: NDArray[np.floating], most: float, is_signed: bool, levels: int = 256) -> Picture:
+    """A metric's picture, from 0 or, if it is signed, from ``-most`` to `most`; grey where there is nothing to show."""
+    ends = (-most if is_signed else 0.0, most)
+    picture = colors(values, ends, DIFFERENCE if is_signed else ERROR, levels)
+    picture[~np.isfinite(values)] = UNKNOWN
+    return picture
+
+
 def error_colors(
     estimate: NDArray[np.float32], truth: NDArray[np.float32], pair_steps: float, levels: int = 256
 ) -> Picture:

@@ -1,1 +1,4 @@
-"""What follows from stored cells: scores, repeats, ablations, curves, archives; imports `runs` and what lies below."""
+"""What follows from stored cells: scores, repeats, ablations, curves, archives.
+
+Imports `runs`, `scenes`, `recording` and what lies below them.
+"""

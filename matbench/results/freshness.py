@@ -27,6 +27,12 @@ _DRAWING, _SOURCES = ("reports", "recording", "results", "measures"), (".py", ".
 _json = make_converter()
 
 
+def own_digest() -> str:
+    """As `digest`, over those of the users' own files that are in use and hold metrics; empty if none do."""
+    files = [file for file in plugins.used() if plugins.own_metrics(file)]
+    return plans.digest(sorted(plugins.code_digest(plugins.Plugin("", str(f), object)) for f in files)) if files else ""
+
+
 @cache
 def digest() -> str:
     """Sixteen hexadecimal digits over all code that turns maps into scores, that of plug-ins' metrics included."""
@@ -34,6 +40,11 @@ def digest() -> str:
     parts = [scores.digest, code.of_module("matbench.regions").digest]
     parts += sorted(plugins.code_digest(plugin) for plugin in plugins.installed("metrics").values())
     return plans.digest(parts)
+
+
+def by() -> str:
+    """What makes scores here and now: `digest` and, after a plus sign, `own_digest`."""
+    return "+".join(filter(None, (digest(), own_digest())))
 
 
 @frozen
@@ -44,6 +55,8 @@ class Made:
     ----------
     scorer
         `digest` of the code.
+    own
+        `own_digest` of the metrics in users' own files, which nobody but who names them reads.
     truth
         Scene -> digest of its ground truth and regions (`Scene.truth_digest`).
     cells
@@ -62,13 +75,19 @@ class Made:
     tables: Mapping[str, str]
     unsteady: tuple[str, ...] = ()
     page: str = ""
+    own: str = ""
+
+    @property
+    def by(self) -> str:
+        """As the function of that name."""
+        return "+".join(filter(None, (self.scorer, self.own)))
 
     @classmethod
     def now(cls, plan: Plan, store: Store, scenes: Mapping[str, Scene], outcomes: Mapping[str, Outcome]) -> "Made":
         """How the tables that lie in a run's folder were made, if they were made now, of these outcomes."""
         truth = {cell.scene: scenes[cell.scene].truth_digest for cell in plan.cells}
         tables = {name: _sha256(store.folder / name) for name in TABLES}
-        return cls(digest(), truth, _cells(store, outcomes), tables)
+        return cls(digest(), truth, _cells(store, outcomes), tables, own=own_digest())
 
     def write(self, store: Store) -> None:
         """Keep it with the tables."""

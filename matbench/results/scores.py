@@ -10,7 +10,7 @@ import pandas as pd
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from matbench.errors import UserError
+from matbench.errors import UserError, unknown
 from matbench.measures.metrics import Metric, score, value_of
 from matbench.measures.prediction import PredictionMetric, differences
 from matbench.measures.volume_metrics import VolumeMetric, reliability
@@ -49,17 +49,46 @@ RELIABILITY_COLUMNS = ("algorithm", "params", "scene", "seed", "materiality", "o
 
 
 def metrics() -> tuple[AnyMetric, ...]:
-    """Every metric that plug-ins offer, the built-in ones first; broken plug-ins are left out."""
-    return _metrics()[0]
+    """Every metric that plug-ins offer, the built-in ones first; broken plug-ins are left out.
+
+    Those of the users' own files that are `matbench.plans.plugins.used` come last.
+
+    Raises
+    ------
+    UserError
+        If such a file holds no metric of a kind that is known, or one whose name is taken.
+    """
+    found = {metric.name: metric for metric in _installed()[0]}
+    for file in plugins.used():
+        for metric in plugins.own_metrics(file):
+            if not isinstance(metric, AnyMetric):
+                raise UserError(f"{file}: {type(metric).__name__} is no metric: make it of matbench.Metric")
+            if found.setdefault(metric.name, metric) != metric:
+                raise UserError(f"{file}: the name of metric {metric.name!r} is taken; give it another one")
+    return tuple(found.values())
+
+
+def metric_named(name: str) -> AnyMetric:
+    """The metric of that name.
+
+    Raises
+    ------
+    UserError
+        If nothing offers it.
+    """
+    known = {metric.name: metric for metric in metrics()}
+    if name not in known:
+        raise unknown("metric", name, known)
+    return known[name]
 
 
 def broken_metrics() -> Mapping[str, str]:
-    """The metric plug-ins that cannot be imported or give no new metrics, with what is wrong."""
-    return _metrics()[1]
+    """The installed metric plug-ins that cannot be imported or give no new metrics, with what is wrong."""
+    return _installed()[1]
 
 
 @cache
-def _metrics() -> tuple[tuple[AnyMetric, ...], Mapping[str, str]]:
+def _installed() -> tuple[tuple[AnyMetric, ...], Mapping[str, str]]:
     found: dict[str, AnyMetric] = {}
     broken: dict[str, str] = {}
     by_source = sorted(plugins.installed("metrics").values(), key=lambda p: p.source != "matbench-stereo")
@@ -200,7 +229,7 @@ def _of_maps(cell: Cell, scene: Scene, estimate: NDArray[np.float32]) -> Iterato
     used = [metric for metric in metrics() if isinstance(metric, Metric)]
     for region, mask in scene.scored_regions.items():
         truth, head = scene.truth[scene.ref], _head(cell, scene.labels[scene.ref], region)
-        values = score(estimate, truth, mask, scene.pair_steps, used)
+        values = score(estimate, truth, mask, scene.pair_steps, used, scene)
         pixels = int((mask & np.isfinite(truth)).sum())
         yield from ((*head, m.name, values[m.name], m.unit, pixels) for m in used)
 

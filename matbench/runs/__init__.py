@@ -1,1 +1,4 @@
-"""What has been done: the run folder, who works on it, what is left; imports `files`, `measures` and `plans`."""
+"""What has been done: the run folder, who works on it, what is left.
+
+Imports the basic modules, `files`, `measures` and `plans`.
+"""

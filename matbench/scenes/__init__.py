@@ -1,1 +1,8 @@
-"""Where scenes come from: found, fetched, checked; imports the root's words, `files`, `measures` and `plans`."""
+"""Where scenes come from: found, fetched, checked.
+
+Imports the basic modules, `files`, `measures` and `plans`.
+"""
+
+from matbench._moved import scene_name as __getattr__
+
+__all__ = ["__getattr__"]

@@ -14,9 +14,10 @@ from attrs import evolve, frozen
 from matbench.errors import UserError, failure, unknown
 from matbench.files.own_folders import data_folder
 from matbench.plans import plugins
+from matbench.regions import regions
 from matbench.scene import Scene
 from matbench.scenes import views_only
-from matbench.scenes.dataset import Dataset, Listing
+from matbench.scenes.dataset import Dataset, Listing, loaded
 from matbench.spec import Spec, expand, label, parse
 
 DATA_VARIABLE = "MATBENCH_DATA"
@@ -61,7 +62,7 @@ def own_folder(name: str) -> str | None:
     prefix, _, rest = name.partition("/")
     if prefix == OWN and rest:
         name = rest
-    elif not name.startswith(("/", ".", "~")) and (prefix in plugins.installed("datasets") or not os.path.isdir(name)):  # noqa: PTH112
+    elif not name.startswith(("/", ".", "~")) and (prefix in plugins.datasets() or not os.path.isdir(name)):  # noqa: PTH112
         return None
     path = os.path.normpath(os.path.expanduser(name))  # noqa: PTH111 (as text: what is typed stays recognizable)
     return path if path.startswith((os.sep, "..")) else os.path.join(".", path)  # noqa: PTH118
@@ -74,20 +75,19 @@ def _folders(pattern: str) -> list[str]:
 
 
 def _dataset(prefix: str) -> Dataset:
-    known = plugins.installed("datasets")
+    known = plugins.datasets()
     if prefix not in known:
         raise unknown("dataset", prefix, known)
-    loaded: Dataset = known[prefix].load()
-    return loaded
+    return loaded(known[prefix])
 
 
 def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
     """Every known scene by its full name; a dataset that cannot be imported by its error."""
     root = data_root(data)
     found: dict[str, Listing | UserError] = {}
-    for prefix, plugin in plugins.installed("datasets").items():
+    for prefix, plugin in plugins.datasets().items():
         try:
-            found |= {f"{prefix}/{listing.name}": listing for listing in plugin.load().listings(root)}
+            found |= {f"{prefix}/{listing.name}": listing for listing in loaded(plugin).listings(root)}
         except UserError as error:
             found[prefix] = error
         except Exception as error:  # a plug-in's own failure harms no other
@@ -186,7 +186,9 @@ def _no_match(spec: Spec, hits: Sequence[str], unfit: Mapping[str, str]) -> User
     return UserError(f"{which}: {advice}")
 
 
-def load_scene(name: str, data: str | Path | None = None) -> Scene:
+def load_scene(
+    name: str, data: str | Path | None = None, plugin: str | Path | Sequence[str | Path] | None = None
+) -> Scene:
     """Load a scene, such as ``middlebury2003/teddy[views=0:9:2]``.
 
     Parameters
@@ -197,14 +199,19 @@ def load_scene(name: str, data: str | Path | None = None) -> Scene:
         Where methods run, another process loads it, and what comes has no truth (`matbench.scenes.views_only`).
     data
         The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
+    plugin
+        Python files that hold further datasets.
 
     Raises
     ------
     UserError
         If the name or an option is unknown, or its files are missing or damaged.
     """
+    if plugin is not None:
+        with plugins.using([plugin] if isinstance(plugin, str | Path) else plugin):
+            return load_scene(name, data)
     if views_only.wanted():
-        return views_only.from_another_process(name, data)
+        return views_only.from_another_process(name, data, plugins.used())
     specs = parse(name)
     if len(specs) != 1:
         raise UserError(f"{name!r} names {len(specs)} scenes: give one value for each option")
@@ -228,4 +235,12 @@ def _load(name: str, options: Mapping[str, str], data: str | Path | None) -> Sce
         raise UserError(
             f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'synthetic/box', or a path, ./{name}"
         )
-    return _dataset(prefix).load(rest, options, data_root(data))
+    scene = _dataset(prefix).load(rest, options, data_root(data))
+    if not scene.name.startswith(f"{prefix}/"):
+        raise UserError(
+            f"dataset {prefix!r} calls its scene {scene.name!r}: what it loads must be called {prefix}/{rest}"
+        )
+    if scene.regions or scene.ref not in scene.truth:
+        return scene
+    partner = scene.pair_steps if scene.ref + scene.pair_steps < scene.n else -scene.pair_steps
+    return evolve(scene, regions=regions(scene.views[scene.ref], scene.truth[scene.ref], partner))

@@ -7,6 +7,8 @@ from typing import Protocol
 
 from attrs import frozen
 
+from matbench.errors import UserError, failure
+from matbench.plans.plugins import Plugin
 from matbench.scene import Scene
 
 
@@ -101,6 +103,8 @@ class Download:
 class Dataset(Protocol):
     """A family of scenes under one prefix: the name of its entry point, such as ``middlebury2003``.
 
+    In a file of one's own, a class that takes no arguments; the prefix is its name in snake case.
+
     One whose scenes can be downloaded also has ``downloads() -> Mapping[str, Mapping[str, Download]]``:
     scene without prefix -> size, the default first -> its files; `matbench fetch` then brings them.
     """
@@ -110,7 +114,9 @@ class Dataset(Protocol):
         ...
 
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:
-        """Load one scene, its `regions` filled in.
+        """Load one scene, called ``prefix/name``, options in brackets.
+
+        Where it has truth but no `regions`, these are filled in as of the field's pair (`matbench.regions.regions`).
 
         Parameters
         ----------
@@ -127,3 +133,20 @@ class Dataset(Protocol):
             For an unknown name, option or value, and for missing or damaged files.
         """
         ...
+
+
+def loaded(plugin: Plugin) -> Dataset:
+    """The dataset that a plug-in offers: it may be a class that takes no arguments.
+
+    Raises
+    ------
+    UserError
+        If it cannot be had.
+    """
+    found = plugin.load()
+    if not isinstance(found, type):
+        return found  # type: ignore[no-any-return]
+    try:
+        return found()  # type: ignore[no-any-return]
+    except Exception as error:
+        raise UserError(f"dataset {plugin.name!r} from {plugin.source}: {failure(error)}") from error

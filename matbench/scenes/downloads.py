@@ -9,7 +9,7 @@ from matbench.errors import UserError, unknown
 from matbench.files.own_folders import data_folder
 from matbench.plans import plugins
 from matbench.scenes.catalogue import DATA_VARIABLE, group, is_pattern
-from matbench.scenes.dataset import Download
+from matbench.scenes.dataset import Download, loaded
 from matbench.spec import expand
 
 
@@ -32,11 +32,11 @@ def fetch_root(data: str | Path | None = None) -> Path:
 def offered() -> dict[str, Mapping[str, Download]]:
     """Every scene that can be fetched: scene's full name -> size -> its files. The default size comes first."""
     found: dict[str, Mapping[str, Download]] = {}
-    for prefix, plugin in plugins.installed("datasets").items():
+    for prefix, plugin in plugins.datasets().items():
         with suppress(UserError):  # one that cannot be imported is shown by `matbench list`
-            loaded = plugin.load()
-            if hasattr(loaded, "downloads"):
-                found |= {f"{prefix}/{name}": sizes for name, sizes in loaded.downloads().items()}
+            dataset = loaded(plugin)
+            if hasattr(dataset, "downloads"):
+                found |= {f"{prefix}/{name}": sizes for name, sizes in dataset.downloads().items()}
     return found
 
 
@@ -73,13 +73,13 @@ def downloads(selectors: str | Iterable[str]) -> tuple[list[Download], list[str]
 
 def _fetchable(name: str, known: Iterable[str]) -> str:
     """The name itself, if it is that of a scene that can be fetched."""
-    datasets = plugins.installed("datasets")
+    datasets = plugins.datasets()
     prefix, _, rest = name.partition("/")
     if not rest:
         raise UserError(f"scene {name!r} has no dataset: write DATASET/SCENE, such as 'middlebury2003/teddy'")
     if prefix not in datasets:
         raise unknown("dataset", prefix, datasets)
-    if not hasattr(datasets[prefix].load(), "downloads"):
+    if not hasattr(loaded(datasets[prefix]), "downloads"):
         raise UserError(f"{name} cannot be fetched: the scenes of {prefix} are not downloaded")
     if name not in known:
         raise unknown("scene", name, (one for one in known if one.startswith(f"{prefix}/")))

@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -59,8 +60,13 @@ def wanted() -> bool:
     return VARIABLE in os.environ
 
 
-def from_another_process(name: str, data: str | Path | None) -> Scene:
+def from_another_process(name: str, data: str | Path | None, files: Sequence[Path] = ()) -> Scene:
     """Have a fresh process load a scene, and take its views only.
+
+    Parameters
+    ----------
+    files
+        The users' own files that may hold its dataset.
 
     Raises
     ------
@@ -70,7 +76,7 @@ def from_another_process(name: str, data: str | Path | None) -> Scene:
     environment = {key: value for key, value in os.environ.items() if key != VARIABLE}
     with TemporaryDirectory(prefix="matbench-") as folder:
         path = Path(folder) / "scene.npz"
-        line = [sys.executable, "-m", "matbench.scenes.reader", str(path), name, *([str(data)] if data else [])]
+        line = [sys.executable, "-m", "matbench.scenes.reader", str(path), name, str(data or ""), *map(str, files)]
         done = subprocess.run(  # noqa: S603 -- this interpreter, and arguments that are no options
             line, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False
         )

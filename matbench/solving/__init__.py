@@ -1,1 +1,4 @@
-"""How cells are solved: in processes of their own, here or on a cluster. Imports no `results` nor what is above it."""
+"""How cells are solved: in processes of their own, here or on a cluster.
+
+Imports `runs`, `scenes`, `recording` and what lies below them.
+"""

@@ -1,7 +1,7 @@
 """Solving the cells of a plan on a Dask cluster.
 
 A worker solves each cell as this machine would: in a process of its own, watched by a keeper, in a
-temporary folder. It sends that folder back as bytes. Users' own files with methods are sent to the worker, with what
+temporary folder. It sends that folder back as bytes. Users' own files are sent to the worker, with what
 they import beside them. Files that a method reads are not, as they may be large: each worker needs them by the same
 path. Scenes are not sent either: the worker reads them from its own data folder, or from the one named here if it has
 that, and compares digests. A worker with other code or another scene declines the cell.
@@ -50,8 +50,8 @@ class Task:
     run
         The name of the run on the cluster: the topic of its events, and part of its tasks' keys.
     files
-        The users' own files that hold methods: the name of each, and by their paths below its folder the content of
-        all that it imports from there, itself included.
+        The users' own files: the name of each, and by their paths below its folder the content of all that it imports
+        from there, itself included.
     """
 
     run: str
@@ -357,7 +357,8 @@ def _why_declined(cell: Cell, files: Sequence[str], root: Path | None) -> str:
     if not is_same:
         return f"the worker has other code of {name}, or other versions of what it imports: install the same"
     try:
-        if _scene_digest(cell.scene, root) != cell.scene_digest:
+        own = () if cell.scene.partition("/")[0] in plugins.installed("datasets") else tuple(files)
+        if _scene_digest(cell.scene, root, own) != cell.scene_digest:
             return f"the worker's {cell.scene} is another one: give all workers the same data"
     except Exception as error:
         return f"the worker has not {cell.scene}: {failure(error)}"
@@ -371,6 +372,6 @@ def _code_digest(cell: Cell, files: Sequence[str]) -> str:
 
 
 @cache
-def _scene_digest(scene: str, root: Path | None) -> str:
-    """The digest of a scene as this machine has it."""
-    return load_scene(scene, root).digest
+def _scene_digest(scene: str, root: Path | None, files: tuple[str, ...]) -> str:
+    """The digest of a scene as this machine has it; `files` may hold its dataset."""
+    return load_scene(scene, root, files).digest

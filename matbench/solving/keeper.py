@@ -114,12 +114,12 @@ class Keeping:
         if self.scene == wanted:
             return None
         self.scene = None
-        name, data, views = job.cell.scene, job.settings.data, self.views
+        name, data, views, files = job.cell.scene, job.settings.data, self.views, job.plugin_files
 
         def read() -> None:
             from matbench.scenes.catalogue import load_scene
 
-            scene = load_scene(name, data)
+            scene = load_scene(name, data, files)
             if scene.digest != wanted[1]:
                 raise UserError(f"{name} is not what it was when the run was planned")
             views_only.write(scene, views)
@@ -235,7 +235,7 @@ class Keeping:
     def _record(self, job: Job, draft: Path, outcome: Outcome, height: int, end: float | None) -> Outcome:
         """Have a recording made of what the method told; the outcome with what was recorded, or why nothing was."""
         assert job.settings.record is not None, "the caller has looked"  # noqa: S101
-        heard, name, data = self.place / TOLD, job.cell.scene, job.settings.data
+        heard, name, data, files = self.place / TOLD, job.cell.scene, job.settings.data, job.plugin_files
         heard.unlink(missing_ok=True)
         if not intake.take(self.answer / TOLD, heard):
             return evolve(outcome, reason="not recorded: it has told nothing")
@@ -244,7 +244,8 @@ class Keeping:
             from matbench.recording import rrd, told
             from matbench.scenes.catalogue import load_scene
 
-            rrd.record_told(draft / "recording.rrd", load_scene(name, data), told.read(heard), title=str(job.cell))
+            scene = load_scene(name, data, files)
+            rrd.record_told(draft / "recording.rrd", scene, told.read(heard), title=str(job.cell))
 
         said = self._errand(record, end)
         heard.unlink()

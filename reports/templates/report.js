@@ -21,12 +21,12 @@
     }
   };
 
-  const sort = (table, column, direction) => {
+  const sort = (table, column, direction, size = (v) => v) => {
     const sign = direction === "descending" ? -1 : 1;
     const key = (row) => {
       const cell = row.cells[column];
       if (cell.dataset.v === undefined) return cell.textContent;
-      return cell.dataset.v === "" ? NaN : Number(cell.dataset.v);
+      return cell.dataset.v === "" ? NaN : size(Number(cell.dataset.v));
     };
     const rows = [...table.tBodies[0].rows].map((row) => ({ row, key: key(row), last: row.matches(".unranked") }));
     rows.sort((a, b) => {
@@ -38,10 +38,10 @@
     table.tBodies[0].append(...rows.map(({ row }) => row));
   };
   const heads = (table) => [...table.tHead.rows[0].cells];
-  const sortBy = (table, head, direction) => {
+  const sortBy = (table, head, direction, size) => {
     heads(table).forEach((other) => other.removeAttribute("aria-sort"));
     head.setAttribute("aria-sort", direction);
-    sort(table, heads(table).indexOf(head), direction);
+    sort(table, heads(table).indexOf(head), direction, size);
   };
   const sortAgain = (table) => {
     const head = heads(table).find((one) => one.hasAttribute("aria-sort"));
@@ -59,11 +59,12 @@
 
   const [score, threshold, region, reference] = ["#score", "#threshold", "#region", "#reference"].map((id) => $(id));
   const metricOf = (family) => family.replace("@", threshold?.value ?? "");
+  const merits = { lower: (v) => v, higher: (v) => -v, zero: Math.abs }; // less is better of what these give
   const best = (metric, where) => {
-    const sign = data.higher.includes(metric) ? -1 : 1;
     const means = data.means[metric][where];
     const known = data.references.filter((method) => means[method][0] !== null);
-    return known.reduce((a, b) => (sign * means[b][0] < sign * means[a][0] ? b : a), known[0]);
+    const merit = merits[data.better[metric]];
+    return known.reduce((a, b) => (merit(means[b][0]) < merit(means[a][0]) ? b : a), known[0]);
   };
   const signed = (value, digits = 2) => (value === null ? "–" : (value < 0 ? "" : "+") + value.toFixed(digits));
 
@@ -78,7 +79,8 @@
     });
     for (const row of table.tBodies[0].rows) fill(row.cells[1], data.ranks[metric][region.value][row.dataset.method]);
     const head = columns.find((one) => one.dataset.score === score.value);
-    sortBy(table, head, data.higher.includes(metric) ? "descending" : "ascending");
+    const better = data.better[metric];
+    sortBy(table, head, better === "higher" ? "descending" : "ascending", better === "zero" ? Math.abs : undefined);
   };
 
   const showDifferences = (metric) => {
@@ -95,7 +97,7 @@
     const ends = [0, ...rows.flatMap((r) => [r.mean ?? 0, r.low ?? 0, r.high ?? 0])];
     const [least, most] = [Math.min(...ends), Math.max(...ends)];
     const place = (value) => String(3 + (94 * ((value ?? 0) - least)) / (most - least || 1));
-    const better = data.higher.includes(metric) ? 1 : -1;
+    const better = data.better[metric] === "higher" ? 1 : -1;
     const verdict = (r) =>
       r.scenes < data.few ? "too few scenes" : r.low * r.high <= 0 ? "undecided" : r.mean * better > 0 ? "better" : "worse";
     $("#reference-name").textContent = other;

@@ -8,12 +8,15 @@ that methods call them by, where there are any: these change less.
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from inspect import signature
 from typing import Any
 
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from matbench import spec
 from matbench.algorithm import Context
 from matbench.datasets.synthetic import SYNTHETIC
 from matbench.scene import Scene
@@ -22,15 +25,27 @@ Work = Callable[[], object]
 CONTEXT = Context(volume=False)
 ROWS = 16  # of what methods do in blocks of rows: like the reference's, the arrays fit into a core's own cache
 
-METHODS: Mapping[str, tuple[str, str, str | None]] = {
-    "materiality": ("materiality", "Materiality", None),
-    "materiality[preset=descent]": ("materiality", "Materiality", "descent"),
-    "materiality[preset=paper]": ("materiality", "Materiality", "paper"),
-    "multiview_sgm": ("multiview_sgm", "MultiviewSGM", None),
-    "okutomi_kanade": ("okutomi_kanade", "OkutomiKanade", None),
-    "voxel_coloring": ("voxel_coloring", "VoxelColoring", None),
-    "sgbm": ("sgbm", "SGBM", None),
-}
+
+def _built_in() -> dict[str, tuple[EntryPoint, str | None]]:
+    """Every built-in method, as it is and with each of its presets; none that must be told something, as a program."""
+    found: dict[str, tuple[EntryPoint, str | None]] = {}
+    for entry in sorted(entry_points(group="matbench.algorithms"), key=lambda one: one.name):
+        if entry.dist is None or entry.dist.name != "matbench-stereo":
+            continue
+        try:
+            cls = entry.load()
+            told = any(one.default is one.empty for one in signature(cls).parameters.values())
+            presets = sorted(getattr(cls, "presets", ()))
+        except Exception:  # another commit may lack it: its own subject fails, and says so
+            told, presets = False, []
+        if not told:
+            found[entry.name] = entry, None
+            found |= {f"{entry.name}[preset={preset}]": (entry, preset) for preset in presets}
+    return found
+
+
+METHODS: Mapping[str, tuple[EntryPoint, str | None]] = _built_in()
+"""Name -> where it is, and its preset."""
 
 
 def _of(module: str, name: str) -> Any:
@@ -40,9 +55,8 @@ def _of(module: str, name: str) -> Any:
 @cache
 def instance(name: str) -> Any:
     """A method of `METHODS`."""
-    module, cls, preset = METHODS[name]
-    made = _of(module, cls)
-    return made(**made.presets[preset]) if preset else made()
+    entry, preset = METHODS[name]
+    return spec.build(entry.name, entry.load(), {"preset": preset} if preset else {})
 
 
 @cache

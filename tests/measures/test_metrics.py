@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from matbench import load_scene
 from matbench.files.images import read_grey
-from matbench.measures.metrics import METRICS, Metric, error_map, score
+from matbench.measures.metrics import METRICS, MapInRegion, Metric, error_map, score
 
 NAMES = [
     "bad_0.5",
@@ -22,6 +23,7 @@ NAMES = [
     "total_bad_4",
     "invalid",
     "avg",
+    "bias",
     "rms",
     "a50",
     "a90",
@@ -105,6 +107,7 @@ def test_numbers_worked_out_by_hand() -> None:
         "bad_4": 20,
         "invalid": 20,
         "avg": 9 / 4,
+        "bias": 3 / 4,
         "rms": (35 / 4) ** 0.5,
         "a50": 2,
     }
@@ -126,6 +129,55 @@ def test_a_metric_of_ones_own() -> None:
     worst = Metric("worst", "px", "lower", "largest error", lambda errors: float(np.nanmax(errors)))
     truth = _map(0, 0)
     assert score(_map(1, -3), truth, _all(truth), 2, [worst]) == {"worst": 6}
+
+
+def test_each_kind_of_metric_is_given_what_it_takes() -> None:
+    scene = load_scene("synthetic/box[size=48x36]")
+    truth, steps = scene.truth[scene.ref], scene.pair_steps
+    estimate = (truth + np.float32(1)).astype(np.float32)
+    estimate[:, 10] = truth[:, 10] - 2
+    estimate[0] = np.nan
+    estimate[1, 0] = np.inf
+    mask = np.zeros(truth.shape, bool)
+    mask[:5, 8:20] = True
+    seen: dict[str, object] = {}
+
+    def look(kind: str) -> Metric:
+        def compute(given: object) -> float:
+            seen[kind] = given
+            return 1.0
+
+        return Metric(kind, "px", "lower", "", compute, takes=kind)  # type: ignore[arg-type]
+
+    kinds = ("absolute", "signed", "map")
+    assert score(estimate, truth, mask, steps, map(look, kinds), scene) == dict.fromkeys(kinds, 1.0)
+    absolute, signed, whole = (seen[kind] for kind in kinds)
+    assert isinstance(whole, MapInRegion)
+    assert isinstance(signed, np.ndarray)
+    assert sorted({round(float(v), 4) for v in signed[~np.isnan(signed)]}) == [-2 * steps, steps]
+    np.testing.assert_array_equal(absolute, np.abs(signed))
+    np.testing.assert_array_equal(whole.error[mask], signed)
+    np.testing.assert_array_equal(whole.truth, truth)
+    assert np.isnan(whole.estimate[1, 0]), "infinite is no answer, neither here"
+    assert whole.error[30, 40] == pytest.approx(steps), "the rest of the map is there, too"
+    assert whole.scene is scene
+    for array in (absolute, signed, whole.estimate, whole.mask, whole.error, whole.truth):
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = 0  # type: ignore[index]
+
+
+def test_a_metric_of_the_map_needs_a_scene() -> None:
+    spatial = Metric("m", "", "lower", "", lambda _: 0.0, takes="map")
+    with pytest.raises(ValueError, match="metric m takes a map: give its scene"):
+        score(_map(1), _map(1), _all(_map(1)), 1, [spatial])
+
+
+def test_a_metric_that_fails_harms_no_other() -> None:
+    wrong = Metric("wrong", "", "lower", "", lambda found: found.nothing, takes="signed")
+    with pytest.warns(UserWarning, match="metric wrong failed: AttributeError"):
+        found = score(_map(2), _map(1), _all(_map(1)), 1, [wrong, *METRICS])
+    assert isnan(found["wrong"])
+    assert found["bias"] == found["avg"] == 1
 
 
 @given(

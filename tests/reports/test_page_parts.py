@@ -163,10 +163,12 @@ def test_many_effects_are_each_its_own() -> None:
 def test_standings_are_over_distinct_scenes_and_ranked_methods(report: Report) -> None:
     scope = tables.shared(report.results, report.cells)
     table = tables.per_scene(report.results, "all", "total_bad_1")
-    ranks = standing.mean_ranks(table, scope, "%", higher=False)
+    ranks = standing.mean_ranks(table, scope, "%", "lower")
     assert list(ranks.values())[:2] == [1, 2]
     assert np.isnan(list(ranks.values())[2])
-    assert list(standing.mean_ranks(table, scope, "%", higher=True).values())[:2] == [2, 1]
+    assert list(standing.mean_ranks(table, scope, "%", "higher").values())[:2] == [2, 1]
+    centred = table - table.iloc[:, :2].to_numpy().max()  # the larger is nearer to zero
+    assert list(standing.mean_ranks(centred, scope, "%", "zero").values())[:2] == [2, 1]
     ((found,),) = standing.differences([table], scope)
     assert (found.effect.mean, found.effect.scenes) == (pytest.approx(10), 2)
     guises = {s: f"made/one[noise={k}]" for k, s in enumerate(scope.asked)}

@@ -110,7 +110,7 @@ def test_mean_ranks_are_over_scenes_and_those_of_the_page() -> None:
         texts = paper.sheet(results, cells, regions=chosen, by_scene=False).texts.set_index("method")
         found = page.ranks["total_bad_1"][region]
         assert texts["mean rank"].to_dict() == {m: shown for m, (_, shown, _) in found.items()}
-    higher = paper.sheet(results, cells, higher=True, regions=["all"])
+    higher = paper.sheet(results, cells, better="higher", regions=["all"])
     assert higher.texts["mean rank"][:2].tolist() == ["1.25", "1.75"]
     assert higher.texts["method"][0] == "b"
 

@@ -94,7 +94,9 @@ def test_read_back_from_a_file(report: Report) -> None:
 def test_places_go_by_what_is_shown() -> None:
     values = pd.Series({"a": 1.001, "b": 1.002, "c": 2.0, "d": np.nan})
     assert tables.places(values, "%").to_dict() == {"a": 1, "b": 1, "c": 0, "d": 0}
-    assert tables.places(values, "%", higher=True).to_dict() == {"a": 2, "b": 2, "c": 1, "d": 0}
+    assert tables.places(values, "%", better="higher").to_dict() == {"a": 2, "b": 2, "c": 1, "d": 0}
+    signed = pd.Series({"a": -0.5, "b": 0.5, "c": -3.0, "d": 0.1})
+    assert tables.places(signed, "px", better="zero").to_dict() == {"a": 2, "b": 2, "c": 0, "d": 1}
     assert not tables.places(values[["a", "b"]], "%").any()
 
 

@@ -34,10 +34,16 @@ def printed(width: int, *args: object) -> str:
 
 def test_where_more_is_better_the_largest_comes_first() -> None:
     results, cells = run_of("good_1", {"low": 97.46, "high": 98.86})
-    assert tables.summary(results, cells, "good_1", higher=True).index.tolist() == ["high", "low"]
+    assert tables.summary(results, cells, "good_1", better="higher").index.tolist() == ["high", "low"]
     assert tables.summary(results, cells, "good_1").index.tolist() == ["low", "high"]
-    text = printed(80, results, cells, "good_1", True)
+    text = printed(80, results, cells, "good_1", "higher")
     assert text.index("98.86") < text.index("97.46")
+
+
+def test_where_zero_is_best_the_smallest_by_magnitude_comes_first() -> None:
+    results, cells = run_of("bias", {"far": -0.9, "near": 0.4, "right": -0.1})
+    assert tables.summary(results, cells, "bias", better="zero").index.tolist() == ["right", "near", "far"]
+    assert tables.summary(results, cells, "bias").index.tolist() == ["far", "right", "near"]
 
 
 def test_a_narrow_terminal_keeps_methods_and_times() -> None:

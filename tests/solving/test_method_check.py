@@ -13,6 +13,7 @@ import numpy as np
 import psutil
 import pytest
 from places import METHODS, TESTS, UNRULY
+from subjects import METHODS as BUILT_IN
 
 from matbench.cli import main
 from matbench.plans.plan import methods
@@ -21,16 +22,6 @@ from matbench.scenes.catalogue import load_scene
 from matbench.solving import check_scenes, check_solve, check_verdicts, method_check
 from matbench.solving.check_scenes import mirrored
 from matbench.solving.check_verdicts import CheckResult
-
-BUILT_IN = [
-    "materiality",
-    "materiality[preset=descent]",
-    "materiality[preset=paper]",
-    "multiview_sgm",
-    "okutomi_kanade",
-    "sgbm",
-    "voxel_coloring",
-]
 
 
 def verdicts(found: list[CheckResult]) -> dict[str, str]:
