@@ -1,6 +1,6 @@
 """Which method is ahead, and whether that is more than chance: mean ranks and paired differences over scenes."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -37,12 +37,14 @@ def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
     return groups.mean().where(groups.count().eq(groups.size(), axis=0))
 
 
-def mean_ranks(table: pd.DataFrame, scope: Shared, unit: str, higher: bool) -> dict[str, float]:
-    """Method -> its rank (1 is best), averaged over `witnesses`; NaN if it is not ranked or lacks a value.
+def mean_ranks(
+    table: pd.DataFrame, scope: Shared, unit: str, higher: bool, aside: Collection[str] = ()
+) -> dict[str, float]:
+    """Method -> its rank, 1 the best, averaged over `witnesses`; ranks go by what is shown, ties share theirs.
 
-    Ranks are those of the numbers as shown; ties share a rank.
+    NaN for a method that is not ranked, is one of `aside`, or lacks a value.
     """
-    rows = witnesses(table, scope)
+    rows = witnesses(table, scope).drop(columns=list(aside), errors="ignore")
     shown = rows.map(lambda value: float(text(value, unit)) if pd.notna(value) else np.nan)
     means = shown.rank(axis=1, ascending=not higher).mean(skipna=False)
     return {m: float(means.get(m, np.nan)) for m in scope.methods}

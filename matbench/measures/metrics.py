@@ -13,6 +13,9 @@ from matbench.errors import failure
 
 Errors = NDArray[np.float64]
 
+ENOUGH = 90.0
+"""Per cent of the pixels. Who answers less is not ranked by a metric over answered pixels: silence must not win."""
+
 TIE = 1e-4
 """Px. An error this little above a threshold is a tie, and a tie is not bad."""
 
@@ -34,6 +37,9 @@ class Metric:
     compute
         (pixels,) absolute errors in px of the pair, NaN where the method has no answer, at least
         one pixel -> the value; NaN where it has none. It must not write to its argument.
+    answered_only
+        Is it over answered pixels only, so that silence does not count against a method? Then who answers fewer
+        than `ENOUGH` is not ranked by it. To be on the safe side, it is unless said otherwise.
     """
 
     name: str
@@ -41,6 +47,7 @@ class Metric:
     better: Literal["lower", "higher"]
     about: str
     compute: Callable[[Errors], float]
+    answered_only: bool = True
 
 
 def error_map(estimate: NDArray[np.float32], truth: NDArray[np.float32], pair_steps: float) -> Errors:
@@ -119,10 +126,11 @@ METRICS: tuple[Metric, ...] = (
             "lower",
             f"not answered, or error above {t:g} px of the pair",
             partial(total_bad, threshold=t),
+            answered_only=False,
         )
         for t in _THRESHOLDS
     ),
-    Metric("invalid", "%", "lower", "not answered", invalid),
+    Metric("invalid", "%", "lower", "not answered", invalid, answered_only=False),
     Metric("avg", "px", "lower", "mean error of answered pixels", average),
     Metric("rms", "px", "lower", "root mean square error of answered pixels", root_mean_square),
     *(

@@ -146,7 +146,7 @@ def test_latex_compiles(report: Report, tmp_path: Path) -> None:
     table = paper.latex(made(awkward(report))).replace("雪", "?")  # which only other engines set
     # without booktabs where it is not installed: its rules are lines
     rules = "".join(rf"\providecommand{{\{rule}rule}}{{\hline}}" for rule in ("top", "mid", "bottom"))
-    packages = r"\usepackage[T1]{fontenc}\usepackage{textcomp}\IfFileExists{booktabs.sty}{\usepackage{booktabs}}"
+    packages = r"\usepackage[T1]{fontenc}\usepackage{textcomp}\IfFileExists{booktabs.sty}{\usepackage{booktabs}}{}"
     head = rf"\documentclass{{article}}{packages}{rules}"
     (tmp_path / "t.tex").write_text(rf"{head}\begin{{document}}{table}\end{{document}}")
     line = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "t.tex"]
