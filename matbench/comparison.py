@@ -229,7 +229,7 @@ class Comparison:
 
     def _facts(self, found: Tables) -> dict[str, str]:
         """What the cells ran on, each on its own: a run may go on elsewhere."""
-        from matbench.reports import tables
+        from matbench.reports import costs
 
         outcomes = [found.outcomes[cell.key] for cell in self.plan.cells if cell.key in found.outcomes]
         threads = [{"threads": str(o.threads)} for o in outcomes if o.threads]
@@ -237,7 +237,7 @@ class Comparison:
         facts = {**provenance.combined([*(o.ran_on for o in outcomes), *threads]), **seeds}
         if found.unsteady:
             facts["not repeatable"] = "; ".join(found.unsteady)
-        if note := tables.timing_note(found.cells):
+        if note := costs.timing_note(found.cells):
             facts["times"] = note
         if self.remarks:
             facts["ranges"] = "; ".join(self.remarks)

@@ -11,8 +11,9 @@ from rich.text import Text
 
 from matbench.measures.statistics import FEW
 from matbench.reports.page_figures import ACROSS, INK, dress, grid_of, line_style, name_curves
-from matbench.reports.tables import METRIC, label, metrics, regions
+from matbench.reports.tables import ASIDE, METRIC, aside_note, interval, label, metrics, regions
 from matbench.reports.tables import text as shown
+from matbench.results.comparable import is_enough
 from matbench.results.sweeps import Sweep
 
 if TYPE_CHECKING:
@@ -75,21 +76,24 @@ def _of(sweep: Sweep, metric: str) -> pd.DataFrame:
 def lines(sweep: Sweep, metric: str = METRIC) -> pd.DataFrame:
     """The table of a sweep as texts: one row for each region and method.
 
-    Columns: region, method, the mean at each value; then the `change` from the first value to the last, its
-    interval and its verdict.
+    Columns: region, method, the values, then `change` from the first value to the last, its
+    interval, how many scenes all this is over, and the verdict.
     """
     rows, out = _of(sweep, metric), []
     for region in regions(rows):
         for method, curve in rows[rows["region"] == region].groupby("method", sort=False):
             unit, last = str(curve["unit"].iloc[0]), curve.iloc[-1]
-            interval = f"{last['change_low']:+.2f} .. {last['change_high']:+.2f}"
             out.append(
                 {"region": region, "method": str(method)}
-                | {f"{v:g}": shown(mean, unit) for v, mean in zip(curve["value"], curve["mean"], strict=True)}
-                | {"change": f"{last['change']:+.2f}", "interval": interval if pd.notna(last["change_low"]) else "–"}
+                | {
+                    f"{v:g}": shown(mean, unit) + ("" if is_enough(over) else ASIDE)
+                    for v, mean, over in curve[["value", "mean", "answered"]].to_numpy(float).tolist()
+                }
+                | {"change": shown(last["change"], "%", signed=True)}
+                | {"interval": interval(last["change_low"], last["change_high"]), "scenes": str(last["scenes"])}
                 | {"verdict": str(last["verdict"])}
             )
-    heads = ["region", "method", *(f"{v:g}" for v in sweep.values), "change", "interval", "verdict"]
+    heads = ["region", "method", *(f"{v:g}" for v in sweep.values), "change", "interval", "scenes", "verdict"]
     return pd.DataFrame(out, columns=heads)
 
 
@@ -110,6 +114,8 @@ def terminal(sweeps: Sequence[Sweep], metric: str = METRIC) -> list[Table]:
             table.add_column(Text(name), justify="left" if words else "right", overflow="fold", no_wrap=not words)
         for values in rows.to_numpy().tolist():
             table.add_row(*(Text(value) for value in values))
+        if rows.map(lambda value: value.endswith(ASIDE)).any(axis=None):
+            table.caption, table.caption_justify = Text(aside_note()), "left"
         out.append(table)
     return out
 

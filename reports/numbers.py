@@ -11,10 +11,11 @@ from attrs import frozen
 
 from matbench.measures.metrics import Better
 from matbench.measures.statistics import Effect
-from matbench.reports import standing, tables
+from matbench.reports import costs, standing, tables
 from matbench.reports.content import Report
 from matbench.reports.standing import Difference
-from matbench.reports.tables import METRIC, REGION, Shared
+from matbench.reports.tables import EFFECT, METRIC, NOT_RANKED, REGION, Shared, interval, text
+from matbench.results.comparable import SILENT
 
 THRESHOLD = re.compile(r"(bad|total_bad)_(\d+(?:\.\d+)?)")
 """Metrics that have a threshold in their name."""
@@ -23,11 +24,15 @@ AT = "@"  # stands for the threshold in a family's name
 
 _FIRST = ("total_bad_@", "bad_@", "invalid", "avg", "rms")
 
-COSTS = {"seconds": ("s", "time"), "peak_mb": ("MiB", "memory")}
+COSTS = {"seconds": ("s", f"{costs.CLOCK} time"), "peak_mb": ("MiB", "memory")}
 """Column of the cells -> unit, and what it is called."""
 
 Entry = list[Any]
-"""[number or None, as shown, place]: one cell of a table, for the template and for the script."""
+"""[number or None, as shown, place, what is said beside it]: a cell of a table, in the template and in the script.
+
+The place is 1 for the best, 2 for the second, `NOT_RANKED` for what is shown but not ranked, else 0. Nothing is said
+beside most: then the last one is left out.
+"""
 
 
 @frozen(eq=False)
@@ -102,7 +107,15 @@ class Numbers:
     @cached_property
     def _tables(self) -> Mapping[tuple[str, str], pd.DataFrame]:
         """(metric, region) -> scenes x methods."""
-        found = tables.every_scene(self.report.results)
+        return self._of("value")
+
+    @cached_property
+    def _answered(self) -> Mapping[tuple[str, str], pd.DataFrame]:
+        """(metric, region) -> scenes x methods: per cent of the pixels that the scores are over."""
+        return self._of("answered")
+
+    def _of(self, column: str) -> Mapping[tuple[str, str], pd.DataFrame]:
+        found = tables.every_scene(self.report.results, column)
         scenes, methods = list(self.scope.asked), list(self.scope.methods)
         nothing = pd.DataFrame(np.nan, index=scenes, columns=methods)
         both = [(m, r) for m in self.units for r in self.regions]
@@ -113,15 +126,29 @@ class Numbers:
         return pd.Series({m: self.scope.is_ranked(m) for m in self.scope.methods}, dtype=bool)
 
     def _by_metric(self, make: Any) -> dict[str, dict[str, Any]]:
-        return {m: {r: make(m, self._tables[m, r]) for r in self.regions} for m in self.units}
+        """Metric -> region -> what is made of its name, its scores and what these are over."""
+        every = {m: {r: (self._tables[m, r], self._answered[m, r]) for r in self.regions} for m in self.units}
+        return {m: {r: make(m, *both) for r, both in by_region.items()} for m, by_region in every.items()}
+
+    @cached_property
+    def counts(self) -> dict[str, dict[str, int]]:
+        """Metric -> region -> how many scenes the means of the ranked methods are over."""
+        return self._by_metric(lambda _metric, table, _answered: tables.count(table, self.scope))
+
+    @cached_property
+    def aside(self) -> dict[str, dict[str, list[str]]]:
+        """Metric -> region -> the methods that answer too little to be ranked by it."""
+        return self._by_metric(
+            lambda _metric, _table, answered: list(tables.too_silent(tables.over_scenes(answered, self.scope)))
+        )
 
     @cached_property
     def means(self) -> dict[str, dict[str, dict[str, Entry]]]:
         """Metric -> region -> method -> entry."""
 
-        def make(metric: str, table: pd.DataFrame) -> dict[str, Entry]:
-            means = tables.over_scenes(table, self.scope)
-            return entries(means, self._ranked, self.units[metric], self.better(metric))
+        def make(metric: str, table: pd.DataFrame, answered: pd.DataFrame) -> dict[str, Entry]:
+            means, over = (tables.over_scenes(part, self.scope) for part in (table, answered))
+            return entries(means, self._ranked, self.units[metric], self.better(metric), over)
 
         return self._by_metric(make)
 
@@ -129,8 +156,9 @@ class Numbers:
     def ranks(self) -> dict[str, dict[str, dict[str, Entry]]]:
         """Metric -> region -> method -> entry with its mean rank."""
 
-        def make(metric: str, table: pd.DataFrame) -> dict[str, Entry]:
-            ranks = standing.mean_ranks(table, self.scope, self.units[metric], self.better(metric))
+        def make(metric: str, table: pd.DataFrame, answered: pd.DataFrame) -> dict[str, Entry]:
+            aside = tables.too_silent(tables.over_scenes(answered, self.scope))
+            ranks = standing.mean_ranks(table, self.scope, self.units[metric], self.better(metric), aside)
             return entries(pd.Series(ranks, dtype=float), self._ranked, "%")
 
         return self._by_metric(make)
@@ -144,11 +172,12 @@ class Numbers:
             s: pd.Series({m: s in self.scope.has[m] for m in self.scope.methods}, dtype=bool) for s in self.scope.asked
         }
 
-        def make(metric: str, table: pd.DataFrame) -> list[list[Entry]]:
+        def make(metric: str, table: pd.DataFrame, answered: pd.DataFrame) -> list[list[Entry]]:
             out = []
-            for scene, row in table.iterrows():
+            for (scene, row), (_, over) in zip(table.iterrows(), answered.iterrows(), strict=True):
                 here = has[str(scene)]
-                found = entries(row.where(here), here, self.units[metric], self.better(metric))
+                unit, better = self.units[metric], self.better(metric)
+                found = entries(row.where(here), here, unit, better, over.where(here))
                 found |= {m: [None, str(status[m, scene]), 0] for m in self.scope.methods if (m, scene) in status}
                 out.append([found[m] for m in self.scope.methods])
             return out
@@ -164,21 +193,40 @@ class Numbers:
 
     @cached_property
     def costs(self) -> dict[str, dict[str, Entry]]:
-        """Column of the cells (`COSTS`) -> method -> entry."""
-        measures = {"seconds": tables.seconds, "peak_mb": tables.memory}
-        return {
-            name: entries(measures[name](self.report.cells, self.scope), self._ranked, unit)
-            for name, (unit, _) in COSTS.items()
-            if name in self.report.cells
-        }
+        """What it cost, by name of the column of the cells."""
+        found = {}
+        if "seconds" in self.report.cells:
+            times = self.times
+            found["seconds"] = entries(times["seconds"], self._ranked & times["alike"].astype(bool), "s")
+            for method, row in times.iterrows():
+                ends = f"{text(row['least'], 's')} .. {text(row['most'], 's')}" if pd.notna(row["least"]) else ""
+                is_aside = not row["alike"] and pd.notna(row["seconds"])
+                said = [ends, "not ranked" if is_aside else ""]
+                entry = found["seconds"][str(method)]
+                entry[2] = NOT_RANKED if is_aside else entry[2]
+                entry += ["; ".join(filter(None, said))] if any(said) else []
+        if "peak_mb" in self.report.cells:
+            memory = costs.memory(self.report.cells, self.scope)
+            found["peak_mb"] = entries(memory, self._ranked, "MiB")
+        return found
+
+    @cached_property
+    def times(self) -> pd.DataFrame:
+        """As `matbench.reports.costs.seconds` makes them."""
+        return costs.seconds(self.report.cells, self.scope)
+
+    def count(self, column: str) -> int:
+        """How many scenes a column of the first table is over."""
+        return len(self.scope.scenes) if column in COSTS else self.counts[self.metric_of(column)][self.region]
 
     def against(self, metric: str, region: str, reference: str | None = None) -> list[dict[str, Any]]:
         """The table of differences from a reference, by default the best method; a line for each ranked method."""
         found = self.differences[metric][region] if self.units else []
         means = self.means[metric][region] if self.units else {}
         known = standing.references(self.scope)
+        aside = self.aside[metric][region] if self.units else []
         if reference is None:
-            values = {m: means[m][0] for m in known if means[m][0] is not None}
+            values = {m: means[m][0] for m in known if means[m][0] is not None and m not in aside}
             reference = min(values, key=lambda m: tables.merit(values[m], self.better(metric)), default=None)
         effects = {d.method: d.effect for d in found if d.reference == reference}
         effects |= {d.reference: turned(d.effect) for d in found if d.method == reference}
@@ -189,11 +237,13 @@ class Numbers:
             {
                 "method": method,
                 "reference": reference,
-                "mean": signed(effect.mean),
-                "interval": f"{signed(effect.low)} .. {signed(effect.high)}" if np.isfinite(effect.low) else "–",
-                "size": signed(effect.size, 1),
+                "mean": text(effect.mean, "%", signed=True),
+                "interval": interval(effect.low, effect.high),
+                "size": text(effect.size, EFFECT, signed=True),
                 "scenes": effect.scenes,
-                "verdict": words(effect.verdict, self.better(metric) == "higher"),
+                "verdict": SILENT
+                if {method, reference} & set(aside)
+                else words(effect.verdict, self.better(metric) == "higher"),
                 "bar": [round(3 + 94 * (v - left) / width, 2) for v in (*_ends(effect), 0.0)],
             }
             for method, effect in ((m, effects[m]) for m in self.scope.methods if m in effects)
@@ -211,6 +261,9 @@ class Numbers:
             "means": self.means,
             "ranks": self.ranks,
             "scenes": self.scenes,
+            "counts": self.counts,
+            "aside": {m: {r: some for r, some in found.items() if some} for m, found in self.aside.items()},
+            "silent": SILENT,
             "references": standing.references(self.scope),
             "differences": {
                 m: {
@@ -222,18 +275,34 @@ class Numbers:
         }
 
 
-def entries(values: pd.Series, ranked: pd.Series, unit: str, better: Better = "lower") -> dict[str, Entry]:
-    """Method -> entry, with the places of the ranked methods."""
-    marks = tables.places(values[ranked], unit, better)
-    return {
-        str(m): [None if pd.isna(v) else float(f"{v:.8g}"), tables.text(v, unit), int(marks.get(m, 0))]
-        for m, v in values.items()
-    }
+def entries(
+    values: pd.Series, ranked: pd.Series, unit: str, better: Better = "lower", answered: pd.Series | None = None
+) -> dict[str, Entry]:
+    """Method -> entry.
+
+    Parameters
+    ----------
+    answered
+        Method -> per cent of the pixels that its value is over: it is told, and who has too little gets no place.
+    """
+    over = pd.Series(np.nan, values.index) if answered is None else answered.reindex(values.index)
+    aside = tables.too_silent(over)
+    marks = tables.places(values[ranked & ~values.index.isin(list(aside))], unit, better)
+    out: dict[str, Entry] = {}
+    for method, value in values.items():
+        out[str(method)] = [_sortable(value), text(value, unit), int(marks.get(method, 0))]
+        if (answers := float(over[str(method)])) < 100 and pd.notna(value):
+            said = f"{tables.share(answers)} answered"
+            out[str(method)].append(f"{said}, not ranked" if method in aside else said)
+            out[str(method)][2] = NOT_RANKED if method in aside else out[str(method)][2]
+    return out
 
 
-def signed(value: float, digits: int = 2) -> str:
-    """A difference as it is shown, with its sign."""
-    return f"{value:+.{digits}f}" if np.isfinite(value) else "–"
+def _sortable(value: float) -> float | None:
+    """A number that JSON can hold; the largest one for infinity, None where there is none."""
+    if pd.isna(value):
+        return None
+    return float(f"{np.clip(value, -1e300, 1e300):.8g}")
 
 
 def words(verdict: str, higher: bool) -> str:
@@ -258,6 +327,9 @@ def _ends(effect: Effect) -> tuple[float, float, float]:
     return low, mean, high
 
 
-def _numbers(effect: Effect) -> list[float | int | None]:
-    found = (effect.mean, effect.low, effect.high, effect.size)
-    return [*(float(f"{v:.6g}") if np.isfinite(v) else None for v in found), effect.scenes]
+def _numbers(effect: Effect) -> list[float | int | str | None]:
+    """Mean, low and high, the scenes; then mean, low, high and size as shown: a browser would round once more."""
+    found = (effect.mean, effect.low, effect.high)
+    shown = (text(v, "%", signed=True) for v in found)
+    numbers = (float(f"{v:.4g}") if np.isfinite(v) else None for v in found)
+    return [*numbers, effect.scenes, *shown, text(effect.size, EFFECT, signed=True)]

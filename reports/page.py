@@ -14,10 +14,11 @@ from attrs import evolve
 from markupsafe import Markup, escape
 
 from matbench.files.writing import write_text
+from matbench.measures.metrics import ENOUGH
 from matbench.measures.statistics import FEW
 from matbench.recording import coloring
-from matbench.regions import REGIONS
-from matbench.reports import curves, error_spread, page_figures, passes, switches, tables
+from matbench.regions import LEAST_PIXELS, LEAST_SHARE, REGIONS
+from matbench.reports import costs, curves, error_spread, page_figures, passes, switches, tables
 from matbench.reports.content import Report
 from matbench.reports.numbers import COSTS, Numbers
 from matbench.reports.pictures import gallery
@@ -67,8 +68,15 @@ def render(report: Report) -> str:
         answer=_answer(rows, scope, numbers),
         counts=report.cells["status"].value_counts().to_dict(),
         table=_table(numbers, rows),
+        table_counts=[numbers.counts[numbers.metric][numbers.region], *map(numbers.count, numbers.columns)]
+        if numbers.units
+        else [],
         costs={name: COSTS[name] for name in numbers.costs},
-        timing=tables.timing_note(report.cells),
+        timing=costs.timing_note(report.cells),
+        clock=costs.CLOCK,
+        silences=tables.silences(report.results, scope),
+        enough=ENOUGH,
+        least=(LEAST_PIXELS, LEAST_SHARE),
         differences=numbers.against(numbers.metric, numbers.region) if numbers.units else [],
         about=REGIONS,
         scenes=shown.scenes,
@@ -162,8 +170,9 @@ def _table(numbers: Numbers, rows: pd.DataFrame) -> list[dict[str, Any]]:
 def _cost_figures(numbers: Numbers, rows: pd.DataFrame) -> list[str]:
     """Accuracy against seconds, and against memory."""
     memory = {m: entry[0] for m, entry in numbers.costs.get("peak_mb", {}).items()}
-    costs = rows.assign(memory=pd.Series(memory, dtype=float).reindex(rows.index))
-    drawn = (page_figures.cost(costs, f"{METRIC} {REGION}", "%", against) for against in page_figures.COSTS)
+    known = rows.assign(memory=pd.Series(memory, dtype=float).reindex(rows.index))
+    known["seconds"] = known["seconds"].where(known["alike"])
+    drawn = (page_figures.cost(known, f"{METRIC} {REGION}", "%", against) for against in page_figures.COSTS)
     return [page_figures.svg(figure) for figure in drawn if figure is not None]
 
 

@@ -16,7 +16,8 @@ from matbench.errors import UserError, one_line, unknown
 from matbench.measures.metrics import Better
 from matbench.measures.statistics import FEW
 from matbench.reports import standing, tables
-from matbench.reports.tables import METRIC, REGION, REGIONS, Shared
+from matbench.reports.tables import METRIC, NOT_RANKED, REGION, REGIONS, Shared
+from matbench.results.comparable import SILENT
 
 Format = Literal["tex", "md", "csv"]
 FORMATS: tuple[Format, ...] = get_args(Format)
@@ -40,7 +41,10 @@ class Sheet:
         One row for each method, over all scenes and in each: ``scene`` (`MEAN` for all), ``method``,
         every region, `RANK`; numbers as shown, `NONE` where there is none.
     places
-        The same rows and number columns: 1 best, 2 second, 0 neither.
+        The same rows and number columns: 1 best, 2 second, 0 neither; `NOT_RANKED` where a number is shown but not
+        ranked.
+    counts
+        Region -> how many scenes its means are over.
     unranked
         Method -> why it is not ranked.
     notes
@@ -52,6 +56,7 @@ class Sheet:
     better: Better
     texts: pd.DataFrame
     places: pd.DataFrame
+    counts: Mapping[str, int]
     unranked: Mapping[str, str]
     notes: tuple[str, ...]
 
@@ -89,7 +94,10 @@ def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     UserError
         If they are missing or damaged.
     """
-    read = (_read(folder / "results.csv", _RESULTS, ("value", "pixels")), _read(folder / "cells.csv", _CELLS, ()))
+    read = (
+        _read(folder / "results.csv", _RESULTS, ("value", "pixels", "answered")),
+        _read(folder / "cells.csv", _CELLS, ()),
+    )
     return tables.labelled(read[0]), tables.labelled(read[1])
 
 
@@ -97,7 +105,7 @@ def _read(path: Path, texts: Mapping[str, type], numbers: Sequence[str]) -> pd.D
     try:
         # a method may be called "nan": only in columns of numbers does nothing mean missing
         frame = pd.read_csv(path, dtype=dict(texts), keep_default_na=False)
-        for name in numbers:
+        for name in [name for name in numbers if name in frame or name != "answered"]:  # older tables have it not
             frame[name] = pd.to_numeric(frame[name].replace("", None))
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}; give the folder of a finished run") from error
@@ -149,32 +157,44 @@ def sheet(
             raise unknown(f"region of {metric} in this run", region, scored)
     chosen = list(dict.fromkeys(regions)) or [r for r in REGIONS if r in scored] or scored
     scope, unit = tables.shared(results, cells), units[metric]
-    by_region = {
-        r: tables.per_scene(results, r, metric).reindex(index=list(scope.asked), columns=list(scope.methods))
-        for r in chosen
-    }
-    means = pd.DataFrame({r: tables.over_scenes(table, scope) for r, table in by_region.items()})
+    by_region, over = (
+        {
+            r: tables.per_scene(results, r, metric, column).reindex(list(scope.asked), columns=list(scope.methods))
+            for r in chosen
+        }
+        for column in ("value", "answered")
+    )
+    means, shares = (
+        pd.DataFrame({r: tables.over_scenes(table, scope) for r, table in part.items()}) for part in (by_region, over)
+    )
     judged = by_region[_judged(chosen)]
-    means[RANK] = pd.Series(standing.mean_ranks(judged, scope, unit, better))
-    unranked = pd.Series([not scope.is_ranked(m) for m in scope.methods], index=list(scope.methods))
+    silent = tables.too_silent(shares[_judged(chosen)])
+    means[RANK] = pd.Series(standing.mean_ranks(judged, scope, unit, better, silent))
+    unranked = pd.Series([not scope.is_ranked(m) or m in silent for m in scope.methods], index=list(scope.methods))
     by = {"unranked": unranked, "merit": tables.merit(means[_judged(chosen)], better)}
     order = pd.DataFrame(by).sort_values(list(by), kind="stable")
-    blocks = {MEAN: means}
+    blocks = {MEAN: (means, shares)}
     for scene in scope.asked if by_scene and len(scope.asked) > 1 else ():
         block = pd.DataFrame({r: table.loc[scene] for r, table in by_region.items()})
         block = block.where(pd.Series({m: scene in scope.has[m] for m in scope.methods}), axis=0)
-        block[RANK] = pd.Series(standing.mean_ranks(judged.loc[[scene]], scope, unit, better))
-        blocks[scene] = block
+        here = pd.DataFrame({r: table.loc[scene] for r, table in over.items()})
+        apart = tables.too_silent(here[_judged(chosen)])
+        block[RANK] = pd.Series(standing.mean_ranks(judged.loc[[scene]], scope, unit, better, apart))
+        blocks[scene] = (block, here)
     texts, places = [], []
-    for name, block in blocks.items():
+    for name, (block, answered) in blocks.items():
         rows = block.reindex([str(m) for m in order.index])
         rivals = [m for m in rows.index if scope.is_ranked(m) or name != MEAN]
         shown, marks = {}, {}
         for column in rows.columns:
             kind = "%" if column == RANK else unit  # ranks have two decimals, too
             shown[column] = [tables.text(v, kind) for v in rows[column]]
-            found = tables.places(rows.loc[rivals, column], kind, "lower" if column == RANK else better)
-            marks[column] = [int(found.get(m, 0)) for m in rows.index]
+            apart = {} if column == RANK else tables.too_silent(answered[column])
+            ranked = rows.loc[[m for m in rivals if m not in apart], column]
+            found = tables.places(ranked, kind, "lower" if column == RANK else better)
+            marks[column] = [
+                NOT_RANKED if m in apart and pd.notna(rows.loc[m, column]) else int(found.get(m, 0)) for m in rows.index
+            ]
         texts.append(pd.DataFrame({"scene": name, "method": list(rows.index), **shown}))
         places.append(pd.DataFrame(marks))
     why = {
@@ -182,20 +202,31 @@ def sheet(
         for m in scope.methods
         if not scope.is_ranked(m)
     }
+    counts = {r: tables.count(table, scope) for r, table in by_region.items()}
+    notes = _notes(cells, scope, counts)
+    if any((part == NOT_RANKED).any(axis=None) for part in places):
+        told = (f"{m} {r} {tables.share(v)}" for r in chosen for m, v in tables.too_silent(shares[r]).items())
+        said = "; ".join(told)
+        notes.append(f"{tables.aside_note()}{f' (answered: {said})' if said else ''}.")
+    notes += [f"{m}: {said}." for m, said in tables.silences(results, scope).items()]
     return Sheet(
         metric,
         unit,
         better,
         pd.concat(texts, ignore_index=True),
         pd.concat(places, ignore_index=True),
+        counts,
         why,
-        tuple(_notes(cells, scope)),
+        tuple(notes),
     )
 
 
-def _notes(cells: pd.DataFrame, scope: Shared) -> list[str]:
+def _notes(cells: pd.DataFrame, scope: Shared, counts: Mapping[str, int]) -> list[str]:
     count = f"Means over {len(scope.scenes)} of {len(scope.asked)} scenes"
     notes = [count + (": too few to conclude." if scope.distinct < FEW else ".")]
+    fewer = [f"{region} {some}" for region, some in counts.items() if some != len(scope.scenes)]
+    if fewer:
+        notes.append(f"Scenes in which a region holds too few pixels do not count in it: {', '.join(fewer)}.")
     bad = cells[cells["status"] != "ok"]
     for row in bad.to_dict("records"):
         reason = "" if pd.isna(row.get("reason")) else " ".join(str(row["reason"]).split())
@@ -211,7 +242,12 @@ def formatted(made: Sheet, format: Format) -> str:
 
 def comma_separated(made: Sheet) -> str:
     """One row for each scene and method, `MEAN` first; what was left without a number is told in ``note``."""
-    notes = made.texts["method"].map(dict(made.unranked)).where(made.texts["scene"] == MEAN)
+    unranked = made.texts["method"].map(dict(made.unranked)).where(made.texts["scene"] == MEAN)
+    apart = [[region for region in made.regions if row[region] == NOT_RANKED] for _, row in made.places.iterrows()]
+    notes = [
+        "; ".join([*([note] if isinstance(note, str) else []), *([f"{SILENT} in {', '.join(some)}"] if some else [])])
+        for note, some in zip(unranked, apart, strict=True)
+    ]
     more = pd.DataFrame({"metric": made.metric, "unit": made.unit, "note": notes})
     # not `assign`: a region may be called "note"
     return pd.concat([made.texts.replace(NONE, ""), more], axis=1).to_csv(index=False, lineterminator="\n")
@@ -239,8 +275,8 @@ def _told(made: Sheet) -> list[str]:
 
 
 def markdown(made: Sheet) -> str:
-    """A Markdown table, as GitHub and most others read it, with the caption above and the notes below."""
-    marks = {0: "{}", 1: "**{}**", 2: "<ins>{}</ins>"}
+    """A table as GitHub and most others read it, its caption above and its notes below."""
+    marks = {0: "{}", 1: "**{}**", 2: "<ins>{}</ins>", NOT_RANKED: "{}" + md(tables.ASIDE)}
     heads, left = _heads(made), 2 if made.has_scenes else 1
     lines = [md(made.caption), "", "| " + " | ".join(map(md, heads)) + " |"]
     lines.append("|" + "|".join([" :-- "] * left + [" --: "] * (len(heads) - left)) + "|")
@@ -297,7 +333,7 @@ def _printable(text: str) -> str:
 
 def latex(made: Sheet) -> str:
     """A floating table for ``\\usepackage{booktabs}`` and ``\\usepackage[T1]{fontenc}``, notes below it."""
-    marks = {0: "{}", 1: r"\textbf{{{}}}", 2: r"\underline{{{}}}"}
+    marks = {0: "{}", 1: r"\textbf{{{}}}", 2: r"\underline{{{}}}", NOT_RANKED: "{}" + tables.ASIDE}
     heads, left = _heads(made), 2 if made.has_scenes else 1
     # not pandas' Styler, as in `switches`: it sets no rule between the scenes and no notes below the table
     lines = [

@@ -1,6 +1,6 @@
 """Which method is ahead, and whether that is more than chance: mean ranks and paired differences over scenes."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -38,12 +38,14 @@ def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
     return groups.mean().where(groups.count().eq(groups.size(), axis=0))
 
 
-def mean_ranks(table: pd.DataFrame, scope: Shared, unit: str, better: Better) -> dict[str, float]:
+def mean_ranks(
+    table: pd.DataFrame, scope: Shared, unit: str, better: Better, aside: Collection[str] = ()
+) -> dict[str, float]:
     """Method -> its rank (1 is best), averaged over `witnesses`; NaN if it is not ranked or lacks a value.
 
-    Ranks are those of the numbers as shown; ties share a rank.
+    NaN for a method that is not ranked, is one of `aside`, or lacks a value.
     """
-    rows = witnesses(table, scope)
+    rows = witnesses(table, scope).drop(columns=list(aside), errors="ignore")
     shown = rows.map(lambda value: float(text(value, unit)) if pd.notna(value) else np.nan)
     means = merit(shown, better).rank(axis=1).mean(skipna=False)
     return {m: float(means.get(m, np.nan)) for m in scope.methods}

@@ -10,7 +10,8 @@ from rich.text import Text
 
 from matbench.reports.page_figures import INK
 from matbench.reports.paper import tex
-from matbench.reports.tables import METRIC, REGIONS
+from matbench.reports.tables import EFFECT, METRIC, REGIONS, interval, share, text
+from matbench.results.comparable import SILENT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,11 +37,11 @@ def lines(ablation: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
         {
             "switch": f"{row['algorithm'] + ': ' if several else ''}{row['factor']} {row['base']} → {row['level']}",
             "region": row["region"],
-            "change": f"{row['change']:+.2f}" if row["change"] == row["change"] else "–",
-            "interval": f"{row['low']:+.2f} .. {row['high']:+.2f}" if row["low"] == row["low"] else "–",
-            "size": f"{row['effect_size']:+.1f}" if row["effect_size"] == row["effect_size"] else "–",
+            "change": text(row["change"], "%", signed=True),
+            "interval": interval(row["low"], row["high"]),
+            "size": text(row["effect_size"], EFFECT, signed=True),
             "scenes": str(row["scenes"]),
-            "verdict": row["verdict"],
+            "verdict": row["verdict"] + (f" ({share(row['answered'])})" if row["verdict"] == SILENT else ""),
         }
         for row in shown.to_dict("records")
     ]

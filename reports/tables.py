@@ -1,19 +1,32 @@
 """The tables of a run. Page, terminal and papers all take their numbers from here, so that they agree."""
 
 from collections.abc import Mapping
+from math import floor
 from typing import TypeVar
 
+import numpy as np
 import pandas as pd
 from attrs import frozen
 
-from matbench.measures.metrics import Better
+from matbench.measures.metrics import ENOUGH, Better
 from matbench.regions import VIEW_REGIONS
+from matbench.reports import costs
+from matbench.results.comparable import counted, is_enough
 from matbench.spec import read_scene
 
 METRIC, REGION = "total_bad_1", "all"
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
 VIEWS = tuple(VIEW_REGIONS)
 Numbers = TypeVar("Numbers", float, pd.Series, pd.DataFrame)
+
+EFFECT = "d"
+"""The unit of effect sizes, Cohen's d: how many standard deviations."""
+
+ASIDE = "*"
+"""Follows a number that is shown, but not ranked; a note says why."""
+
+NOT_RANKED = -1
+"""The place of such a number."""
 
 _NO_SCENES: frozenset[str] = frozenset()
 
@@ -36,6 +49,8 @@ def labelled(frame: pd.DataFrame) -> pd.DataFrame:
     out["method"] = [label(a, p) for a, p in zip(out["algorithm"], out["params"], strict=True)]
     if "seed" not in out:
         out["seed"] = 0
+    if "value" in out and "answered" not in out:
+        out["answered"] = np.nan  # nobody knows
     names = out.columns.intersection(["method", "scene", "region", "metric", "unit", "status"])
     return out.astype(dict.fromkeys(names, object))
 
@@ -107,25 +122,30 @@ def metrics(results: pd.DataFrame) -> dict[str, str]:
     return dict(zip(found["metric"], found["unit"].fillna(""), strict=True))
 
 
-def per_scene(results: pd.DataFrame, region: str, metric: str) -> pd.DataFrame:
+def per_scene(results: pd.DataFrame, region: str, metric: str, column: str = "value") -> pd.DataFrame:
     """Scores of one metric in one region: scenes x methods, the mean over seeds, NaN where there is none.
 
-    A seed without a value leaves its scene without one: it is not averaged away.
+    A seed without a value leaves its scene without one: it is not averaged away. Scenes in which the region holds too
+    few pixels (`matbench.results.comparable.counted`) have none.
+
+    Parameters
+    ----------
+    column
+        ``"answered"`` for the per cent of the pixels that the scores are over.
     """
     scored = labelled(results)
-    rows = scored[(scored["region"] == region) & (scored["metric"] == metric)]
-    groups = rows.assign(value=rows["value"].astype(float)).groupby(["scene", "method"])["value"]
-    means = groups.mean().where(groups.count() == groups.size()).unstack("method")
-    scenes, methods = scored["scene"].unique(), scored["method"].unique()
-    return means.reindex(index=scenes, columns=methods).rename_axis(index="scene", columns="method")
+    rows = scored[(scored["metric"] == metric)]
+    rows = rows[counted(rows) & (rows["region"] == region)]
+    return _wide(rows, ["scene", "method"], column).reindex(
+        index=pd.Index(scored["scene"].unique(), name="scene"),
+        columns=pd.Index(scored["method"].unique(), name="method"),
+    )
 
 
-def every_scene(results: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
+def every_scene(results: pd.DataFrame, column: str = "value") -> dict[tuple[str, str], pd.DataFrame]:
     """(metric, region) -> the table that `per_scene` makes, for all of them at once."""
     scored = labelled(results)
-    keys = ["metric", "region", "scene", "method"]
-    groups = scored.assign(value=scored["value"].astype(float)).groupby(keys, sort=False)["value"]
-    wide = groups.mean().where(groups.count() == groups.size()).unstack("method")
+    wide = _wide(scored[counted(scored)], ["metric", "region", "scene", "method"], column)
     scenes, methods = scored["scene"].unique(), scored["method"].unique()
     return {
         (str(metric), str(region)): part.droplevel(["metric", "region"]).reindex(index=scenes, columns=methods)
@@ -133,12 +153,17 @@ def every_scene(results: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
     }
 
 
-def means(results: pd.DataFrame, scope: Shared, region: str, metric: str) -> pd.Series:
-    """Method -> mean over the scenes that count for it; NaN if one of them has no value.
+def _wide(rows: pd.DataFrame, keys: list[str], column: str) -> pd.DataFrame:
+    groups = rows.assign(number=rows[column].astype(float)).groupby(keys, sort=False)["number"]
+    return groups.mean().where(groups.count() == groups.size()).unstack("method")
 
-    Scenes in which the region is empty, so that no method has a value, do not count.
+
+def means(results: pd.DataFrame, scope: Shared, region: str, metric: str, column: str = "value") -> pd.Series:
+    """Method -> mean over the scenes it is counted on; NaN where one of them has no value.
+
+    Scenes in which the region counts for no method are left out.
     """
-    return over_scenes(per_scene(results, region, metric), scope)
+    return over_scenes(per_scene(results, region, metric, column), scope)
 
 
 def over_scenes(table: pd.DataFrame, scope: Shared) -> pd.Series:
@@ -149,47 +174,47 @@ def over_scenes(table: pd.DataFrame, scope: Shared) -> pd.Series:
     return pd.Series({m: table.loc[chosen[m], m].mean(skipna=False) for m in scope.methods}, dtype=float)
 
 
-def timed_alike(cells: pd.DataFrame) -> pd.Series:
-    """A mask of the cells whose seconds can be compared.
+def count(table: pd.DataFrame, scope: Shared) -> int:
+    """How many scenes the means of the ranked methods are over, in a table that `per_scene` made."""
+    return int(table.reindex(index=list(scope.scenes)).notna().any(axis=1).sum())
 
-    They were measured while no other cell ran, on one machine and with one number of threads. If there are
-    several such groups, it is the largest.
+
+def too_silent(answered: pd.Series) -> dict[str, float]:
+    """The methods whose scores are over too little to be ranked (`matbench.measures.metrics.ENOUGH`).
+
+    Parameters
+    ----------
+    answered
+        Method -> per cent of the pixels that its scores are over.
     """
-    alone = cells.get("alone", pd.Series(True, cells.index)).astype(str) != "False"
-    good = (cells["status"] == "ok") & alone
-    names = ("machine", "threads")
-    where = pd.Series("", cells.index)
-    for name in names:
-        where += " " + cells.get(name, pd.Series("", cells.index)).astype(str)
-    places = where[good].value_counts(sort=False)
-    return good & (where == places.idxmax()) if len(places) else good
+    return {str(m): float(share) for m, share in answered.items() if not is_enough(share)}
 
 
-def timing_note(cells: pd.DataFrame) -> str:
-    """A note if not all times can be compared; else empty."""
-    ok = int((cells["status"] == "ok").sum())
-    compared = int(timed_alike(cells).sum())
-    if compared == ok:
-        return ""
-    return f"time: of {compared} of {ok} cells; the others ran on another machine or not alone"
+def aside_note() -> str:
+    """What `ASIDE` after a score means."""
+    return f"{ASIDE} over answered pixels only, and fewer than {ENOUGH:g} % are answered: shown, not ranked"
 
 
-def seconds(cells: pd.DataFrame, scope: Shared) -> pd.Series:
-    """Method -> mean wall time per scene, over the same scenes as its scores; NaN unless all are `timed_alike`."""
-    planned = labelled(cells)
-    good = planned[timed_alike(planned)]
-    table = good.assign(seconds=good["seconds"].astype(float)).groupby(["scene", "method"])["seconds"].mean()
-    wide = table.unstack("method").reindex(index=list(scope.asked), columns=list(scope.methods))
-    return pd.Series({m: wide.loc[list(scope.counted(m)), m].mean(skipna=False) for m in scope.methods}, dtype=float)
+def answers(results: pd.DataFrame, scope: Shared) -> pd.Series:
+    """Method -> per cent of the pixels that it answers in `all`, or predicts, mean over the scenes it is counted on."""
+    return over_scenes(_answers(results), scope)
 
 
-def memory(cells: pd.DataFrame, scope: Shared) -> pd.Series:
-    """Method -> the largest peak memory, in MiB, over the scenes that count: what a machine must have."""
-    planned = labelled(cells)
-    good = planned[planned["status"] == "ok"]
-    table = good.assign(peak=good["peak_mb"].astype(float)).groupby(["scene", "method"])["peak"].max().unstack("method")
-    wide = table.reindex(index=list(scope.asked), columns=list(scope.methods))
-    return pd.Series({m: wide.loc[list(scope.counted(m)), m].max(skipna=False) for m in scope.methods}, dtype=float)
+def _answers(results: pd.DataFrame) -> pd.DataFrame:
+    if "invalid" in set(results["metric"]):
+        return 100 - per_scene(results, REGION, "invalid")
+    return per_scene(results, REGION, "prediction_coverage")
+
+
+def silences(results: pd.DataFrame, scope: Shared) -> dict[str, str]:
+    """Method -> what is to be said of it if there are scenes on which it answers nothing at all."""
+    silent = (_answers(results) == 0).sum()
+    counts = {m: (int(silent.get(m, 0)), len(scope.has[m])) for m in scope.methods}
+    return {
+        m: "no answer anywhere" if some == of else f"no answer at all on {some} of {of} scenes"
+        for m, (some, of) in counts.items()
+        if some
+    }
 
 
 def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, better: Better = "lower") -> pd.DataFrame:
@@ -207,18 +232,26 @@ def summary(results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, be
     Returns
     -------
     Index: the methods' labels. Columns: ``<metric> <region>`` for `summarised` regions, ``avg all``
-    (pixels of the pair), ``seconds``, then ``scenes`` (how many the means are over), ``asked``
-    (how many it was asked for) and ``ranked``. Ranked methods share their scenes; a method that
-    lacks one of these has means over its own scenes and is not ranked.
+    (pixels of the pair), ``seconds`` (`matbench.reports.costs.seconds`), then ``scenes`` (how many the means are
+    over), ``asked`` (how many it was asked for) and ``ranked``. Ranked methods share their scenes; a method that
+    lacks one of these has means over its own scenes and is not ranked; nor is one whose scores are over too little
+    (`too_silent`), if `metric` is over answered pixels only. ``alike``: may its seconds be ranked? ``answers``: per
+    cent of the pixels that it answers in `all`. ``remark``: why it is not ranked, and what it leaves unanswered.
     """
     scope = shared(results, cells)
     columns = {f"{metric} {region}": means(results, scope, region, metric) for region in summarised(results)}
     columns["avg all"] = means(results, scope, REGION, "avg")
-    columns["seconds"] = seconds(cells, scope)
+    times = costs.seconds(labelled(cells), scope)
+    columns["seconds"] = times["seconds"]
     out = pd.DataFrame(columns, index=pd.Index(scope.methods, name="method", dtype=str), dtype=float)
     out["scenes"] = [len(scope.counted(m)) for m in scope.methods]
     out["asked"] = len(scope.asked)
-    out["ranked"] = pd.Series([scope.is_ranked(m) for m in scope.methods], out.index, dtype=bool)
+    silent = too_silent(means(results, scope, REGION, metric, "answered"))
+    ranked = [scope.is_ranked(m) and m not in silent for m in scope.methods]
+    out["ranked"] = pd.Series(ranked, out.index, dtype=bool)
+    out["alike"] = times["alike"].astype(bool)
+    out["answers"] = answers(results, scope)
+    out["remark"] = pd.Series(_remarks(out, scope, silences(results, scope)), dtype=object).reindex(out.index)
     by = {"unranked": ~out["ranked"], "merit": merit(out[f"{metric} {REGION}"], better)}
     order = out.assign(**by).sort_values(list(by), kind="stable")
     return out.loc[order.index]
@@ -244,19 +277,60 @@ def merit(values: Numbers, better: Better) -> Numbers:
     return -values if better == "higher" else abs(values) if better == "zero" else values
 
 
-def text(value: float, unit: str) -> str:
-    """A number as every table shows it, without its unit.
+def _remarks(rows: pd.DataFrame, scope: Shared, silent: Mapping[str, str]) -> dict[str, str]:
+    """What stands below each method's name."""
+    found = {}
+    for method, row in rows.iterrows():
+        said = [] if row["ranked"] else ["not ranked"]
+        if not scope.is_ranked(str(method)):
+            said = [f"not ranked: {row['scenes']} of {row['asked']} scenes"]
+        if 0 < row["answers"] < 100:
+            said.append(f"answers {share(row['answers'])}")
+        said += [silent[str(method)]] if str(method) in silent else []
+        found[str(method)] = "; ".join(said)
+    return found
 
-    >>> text(2.345, "%"), text(0.01234, "s"), text(float("nan"), "px")
-    ('2.35', '0.012', '–')
+
+def text(value: float, unit: str, signed: bool = False) -> str:
+    """A number as every table shows it: in at most eight characters, nine with a sign.
+
+    >>> text(2.345, "%"), text(0.01234, "s"), text(float("nan"), "px"), text(4.63e35, "px"), text(float("inf"), "px")
+    ('2.35', '0.012', '–', '4.6e+35', 'inf')
+    >>> text(2.345, "%", signed=True), text(-123456, "px", signed=True), text(-0.0, "s", signed=True)
+    ('+2.35', '-1.2e+05', '+0.000')
     """
     if pd.isna(value):
         return "–"
+    sign, size = "+" if signed else "", abs(value)
+    if np.isinf(value):
+        return f"{value:{sign}}"
+    if size >= 99999.995:
+        return f"{value:{sign}.1e}"
     if unit in ("%", "px"):
-        return f"{value:.2f}"
+        return f"{value + 0.0:{sign}.2f}"
+    if unit == EFFECT:
+        return f"{value + 0.0:{sign}.1f}"
     if unit == "s":
-        return f"{value:.{0 if value >= 100 else 1 if value >= 10 else 2 if value >= 1 else 3}f}"
-    return f"{value:.4g}"
+        return f"{value + 0.0:{sign}.{0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3}f}"
+    return f"{value + 0.0:{sign}.3g}" if size < 1e-4 else f"{value + 0.0:{sign}.4g}"
+
+
+def interval(low: float, high: float) -> str:
+    """The ends of an interval, as shown everywhere.
+
+    >>> interval(-0.98, 3.17), interval(float("nan"), float("nan"))
+    ('-0.98 .. +3.17', '–')
+    """
+    return f"{text(low, '%', signed=True)} .. {text(high, '%', signed=True)}" if np.isfinite(low) else "–"
+
+
+def share(answered: float) -> str:
+    """Per cent of the pixels, never rounded up: less than all is not called all.
+
+    >>> share(100), share(99.97), share(0.98), share(0)
+    ('100 %', '99.9 %', '0.9 %', '0 %')
+    """
+    return f"{floor(answered * 10 + 1e-9) / 10:g} %"
 
 
 def places(values: pd.Series, unit: str, better: Better = "lower") -> pd.Series:

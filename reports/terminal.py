@@ -9,20 +9,25 @@ from rich.text import Text
 
 from matbench.measures.metrics import Better
 from matbench.measures.statistics import FEW
+from matbench.reports.costs import CLOCK, timing_note
 from matbench.reports.tables import (
+    ASIDE,
     METRIC,
     REGION,
     REGIONS,
     VIEWS,
     Shared,
+    aside_note,
+    count,
     labelled,
+    means,
     metrics,
     per_scene,
     places,
     shared,
     summarised,
     summary,
-    timing_note,
+    too_silent,
 )
 from matbench.reports.tables import text as shown
 
@@ -44,12 +49,10 @@ def tables(
     out = []
     if scope.methods and len(results):
         heads = {f"{metric} {r}": r.replace("textureless", "texture-\nless") for r in REGIONS}
-        heads |= {"avg all": "avg\nall", "seconds": "time"}
+        heads |= {"avg all": "avg\nall", "seconds": f"{CLOCK}\ntime"}
         if width < WIDTH:
             heads = {column: head for column, head in heads.items() if column.split()[-1] not in NARROW}
         out.append(_summary(results, cells, scope, metric, better, "by region", heads))
-        if note := timing_note(cells):
-            out[-1].caption, out[-1].caption_justify = Text(note), "left"
         over_views = [r for r in summarised(results) if r in VIEWS]
         if per_scene(results, VIEWS[0], metric).notna().any(axis=None):
             heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in over_views}
@@ -67,8 +70,9 @@ def _plain(title: str) -> Table:
     return Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
 
 
-def _number(value: float, unit: str, place: int) -> Text:
-    return Text(shown(value, unit), style="bold" if place == 1 else "")
+def _number(value: float, unit: str, place: int, is_aside: bool = False) -> Text:
+    mark = ASIDE if is_aside and pd.notna(value) else ""
+    return Text(shown(value, unit) + mark, style="bold" if place == 1 else "")
 
 
 def _summary(
@@ -80,23 +84,42 @@ def _summary(
     what: str,
     heads: dict[str, str],
 ) -> Table:
-    """Methods x the columns of the summary that have a heading."""
+    """Methods x the columns of the summary that have a heading; below them, how many scenes each is over."""
     rows, unit = summary(results, cells, metric, better), metrics(results).get(metric, "%")
-    count = f"{len(scope.scenes)} of {len(scope.asked)} scenes"
     hint = "; too few scenes to conclude" if scope.distinct < FEW else ""
-    table = _plain(f"{metric} ({unit}) {what}, mean over {count}{hint}")
+    over = f"{len(scope.scenes)} of {len(scope.asked)} scenes"
+    table = _plain(f"{metric} ({unit}) {what}, mean over {over}{hint}")
+    table.show_footer = len(scope.scenes) > 1
     table.add_column("#", justify="right", no_wrap=True)
-    table.add_column("method", overflow="fold", min_width=12)
+    table.add_column("method", Text("scenes", style="italic"), overflow="fold", min_width=12)
     units = {column: {"avg all": "px", "seconds": "s"}.get(column, unit) for column in heads}
+    marks: dict[str, pd.Series] = {}
+    asides: dict[str, set[str]] = {}
     for column, head in heads.items():
-        table.add_column(Text(f"{head}\n{units[column]}"), justify="right", no_wrap=True, vertical="top")
-    marks = {c: places(rows.loc[rows["ranked"], c], u, better if metric in c else "lower") for c, u in units.items()}
+        (name, _, region), counted = column.partition(" "), len(scope.scenes)
+        asides[column] = set(rows.index[~rows["alike"]]) if column == "seconds" else set()
+        if column != "seconds":
+            counted = count(per_scene(results, region, name), scope)
+            asides[column] = set(too_silent(means(results, scope, region, name, "answered")))
+        rivals = [m for m in rows.index if scope.is_ranked(m) and m not in asides[column]]
+        marks[column] = places(rows.loc[rivals, column], units[column], better if name == metric else "lower")
+        table.add_column(
+            Text(f"{head}\n{units[column]}"),
+            Text(str(counted), style="italic"),
+            justify="right",
+            no_wrap=True,
+            vertical="top",
+        )
     for number, (method, row) in enumerate(rows.iterrows(), 1):
-        name = Text(str(method))
-        if not row["ranked"]:
-            name.append(f"\nnot ranked: {row['scenes']} of {row['asked']} scenes", style="italic")
-        values = [_number(row[c], u, marks[c].get(method, 0)) for c, u in units.items()]
-        table.add_row(str(number), name, *values, style="" if row["ranked"] else "dim")
+        label = Text(str(method))
+        if row["remark"]:
+            label.append(f"\n{row['remark']}", style="italic")
+        values = [_number(row[c], u, marks[c].get(method, 0), method in asides[c]) for c, u in units.items()]
+        table.add_row(str(number), label, *values, style="" if row["ranked"] else "dim")
+    notes = [aside_note()] if any(asides[c] for c in heads if c != "seconds") else []
+    if "seconds" in heads and (note := timing_note(cells)):
+        notes.append(note)
+    table.caption, table.caption_justify = Text("\n".join(notes)) if notes else None, "left"
     return table
 
 
@@ -121,7 +144,10 @@ def _scenes(
     methods = [str(m) for m in summary(results, cells, metric, better).index]
     unit = metrics(results).get(metric, "%")
     numbers = {m: i for i, m in enumerate(methods, 1)}
-    values = per_scene(results, REGION, metric).reindex(index=list(scope.asked), columns=methods)
+    values, answered = (
+        per_scene(results, REGION, metric, column).reindex(index=list(scope.asked), columns=methods)
+        for column in ("value", "answered")
+    )
     names = _short(scope.asked)
     first = min(max(map(len, names.values()), default=0), 28)
     heads = _headings(methods, numbers, room - first)
@@ -136,12 +162,13 @@ def _scenes(
         table.add_column("scene", overflow="fold", min_width=12)
         for head in heads[start : start + at_once]:
             table.add_column(Text(head), justify="right", overflow="fold")
-        for scene, row in values.iterrows():
-            marks = places(row[[m for m in methods if scene in scope.has[m]]], unit, better)
+        for (scene, row), (_, over) in zip(values.iterrows(), answered.iterrows(), strict=True):
+            asides = too_silent(over)
+            marks = places(row[[m for m in methods if scene in scope.has[m] and m not in asides]], unit, better)
             shown_row = [
                 Text(status[m, str(scene)], style="italic")
                 if (m, scene) in status
-                else _number(row[m], unit, marks.get(m, 0))
+                else _number(row[m], unit, marks.get(m, 0), m in asides)
                 for m in part
             ]
             table.add_row(Text(names[str(scene)]), *shown_row)

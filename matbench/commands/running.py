@@ -19,7 +19,7 @@ from matbench.comparison import Comparison
 from matbench.measures.metrics import Better
 from matbench.plans.limits import crowded
 from matbench.plans.plugins import using
-from matbench.reports import curves, tables, terminal
+from matbench.reports import costs, curves, tables, terminal
 from matbench.reports import switches as effects
 from matbench.results import scores
 from matbench.results.freshness import PAGE
@@ -198,9 +198,14 @@ def document(
     Keys: ``folder``; ``files``, what was written; ``interrupted``; ``cells``, status -> how many; ``unscored``,
     each cell without a score with its reason; ``left_out``, why -> scenes; ``metric``; ``table``, the methods, best
     first, with their means over the scenes they share in ``regions``, ``avg`` (pixels of the pair, in `all`) and
-    ``seconds``; null where there is no number.
+    ``seconds``; null where there is no number. ``counted``: region -> how many scenes its means are over. Of each
+    method also ``answered``: region -> per cent of the pixels that its mean is over; ``answers``: per cent of the
+    pixels of `all` that it answers; ``seconds_ranked``: may its seconds be compared? and ``remark``: why it is not
+    ranked, and what it leaves unanswered. ``clock``: whose seconds these are.
     """
-    regions = tables.summarised(results)
+    regions, scope = tables.summarised(results), tables.shared(results, cells)
+    counted = {region: tables.count(tables.per_scene(results, region, metric), scope) for region in regions}
+    answered = {region: tables.means(results, scope, region, metric, "answered") for region in regions}
     rows = [
         {
             "method": str(method),
@@ -210,6 +215,10 @@ def document(
             "regions": {region: _number(row[f"{metric} {region}"]) for region in regions},
             "avg": _number(row["avg all"]),
             "seconds": _number(row["seconds"]),
+            "seconds_ranked": bool(row["alike"]),
+            "answered": {region: _number(answered[region][str(method)]) for region in regions},
+            "answers": _number(row["answers"]),
+            "remark": str(row["remark"]),
         }
         for method, row in tables.summary(results, cells, metric, _better(metric)).iterrows()
     ]
@@ -224,6 +233,8 @@ def document(
         "unscored": [dict(zip(columns, map(_plain, row), strict=True)) for row in bad[columns].to_numpy().tolist()],
         "left_out": {reason: list(scenes) for reason, scenes in ready.left_out.items()},
         "metric": {"name": metric, "unit": tables.metrics(results).get(metric, ""), "better": _better(metric)},
+        "counted": counted,
+        "clock": costs.CLOCK,
         "table": rows,
     }
 

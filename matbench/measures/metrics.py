@@ -17,6 +17,9 @@ Errors = NDArray[np.float64]
 Better = Literal["lower", "higher", "zero"]
 """Which numbers are better: lower ones, higher ones, or those that are nearer to zero."""
 
+ENOUGH = 90.0
+"""Per cent of the pixels. Who answers less is not ranked by a metric over answered pixels: silence must not win."""
+
 TIE = 1e-4
 """Px. An error this little above a threshold is a tie, and a tie is not bad."""
 
@@ -45,6 +48,9 @@ class Metric:
     picture
         A `MapInRegion` of all pixels with known truth -> (H, W) numbers in `unit`, NaN where there is nothing to
         show: what ``matbench figure maps --metric`` draws. None if there is nothing to look at.
+    answered_only
+        Is it over answered pixels only, so that silence does not count against a method? Then who answers fewer
+        than `ENOUGH` is not ranked by it. To be on the safe side, it is unless said otherwise.
     """
 
     name: str
@@ -56,6 +62,7 @@ class Metric:
         default="absolute", validator=in_(("absolute", "signed", "map"))
     )
     picture: "Callable[[MapInRegion], NDArray[np.floating]] | None" = None
+    answered_only: bool = True
 
 
 @frozen(eq=False)
@@ -170,10 +177,11 @@ METRICS: tuple[Metric, ...] = (
             "lower",
             f"not answered, or error above {t:g} px of the pair",
             partial(total_bad, threshold=t),
+            answered_only=False,
         )
         for t in _THRESHOLDS
     ),
-    Metric("invalid", "%", "lower", "not answered", invalid),
+    Metric("invalid", "%", "lower", "not answered", invalid, answered_only=False),
     Metric("avg", "px", "lower", "mean error of answered pixels", average),
     Metric(
         "bias",

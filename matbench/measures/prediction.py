@@ -30,8 +30,8 @@ class PredictionMetric:
 
     Parameters
     ----------
-    name, unit, better, about
-        As for `matbench.measures.metrics.Metric`.
+    name, unit, better, about, answered_only
+        As for `matbench.measures.metrics.Metric`; what is not predicted is not answered.
     compute
         (pixels, 3) differences in grey levels, NaN where nothing is predicted -> the value; NaN
         where it has none. It must not write to its argument.
@@ -42,6 +42,7 @@ class PredictionMetric:
     better: Literal["lower", "higher"]
     about: str
     compute: Callable[[Differences], float]
+    answered_only: bool = True
 
 
 def predictable(scene: Scene) -> tuple[str, ...]:
@@ -135,5 +136,12 @@ def coverage(found: Differences) -> float:
 
 METRICS: tuple[PredictionMetric, ...] = (
     PredictionMetric("prediction_psnr", "dB", "higher", "withheld view against its prediction, where one is", psnr),
-    PredictionMetric("prediction_coverage", "%", "higher", "pixels of the withheld view that are predicted", coverage),
+    PredictionMetric(
+        "prediction_coverage",
+        "%",
+        "higher",
+        "pixels of the withheld view that are predicted",
+        coverage,
+        answered_only=False,
+    ),
 )

@@ -28,6 +28,8 @@ class VolumeMetric:
     ----------
     name, unit, better, about
         As for `matbench.measures.metrics.Metric`; the unit is ``"%"``, or empty for a plain number.
+    answered_only
+        Is it over rays with a material point only, as `told` counts them?
     compute
         `Rays`, at least one -> the value; NaN where it has none. It must not write to its argument.
     """
@@ -37,6 +39,7 @@ class VolumeMetric:
     better: Literal["lower", "higher"]
     about: str
     compute: Callable[[Rays], float]
+    answered_only: bool = False
 
 
 def _material(rays: Rays) -> NDArray[np.bool_]:
@@ -47,6 +50,11 @@ def _right_and_wrong(rays: Rays, tolerance: float) -> tuple[NDArray[np.bool_], N
     """(rays, planes) material points near the surface, and those where nothing is."""
     before, material = rays.before_surface, _material(rays)
     return material & (np.abs(before) <= tolerance + TIE), material & (before > tolerance + TIE)
+
+
+def told(rays: Rays) -> float:
+    """Per cent of the rays that have a material point (1/2 or more) not behind the surface by more than a plane."""
+    return 100 * float((_material(rays) & (rays.before_surface >= -1 - TIE)).any(axis=1).mean())
 
 
 def precision(rays: Rays, tolerance: float) -> float:
@@ -113,7 +121,14 @@ _TOLERANCES = (1, 2)
 
 METRICS: tuple[VolumeMetric, ...] = (
     *(
-        VolumeMetric(f"surface_{name}_{t}", "%", "higher", about.format(t), partial(compute, tolerance=t))
+        VolumeMetric(
+            f"surface_{name}_{t}",
+            "%",
+            "higher",
+            about.format(t),
+            partial(compute, tolerance=t),
+            answered_only=compute is precision,
+        )
         for t in _TOLERANCES
         for name, about, compute in (
             ("precision", "material points within {} planes of the surface, of those not behind it", precision),

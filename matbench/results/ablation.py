@@ -8,6 +8,7 @@ from attrs import asdict
 from matbench.errors import UserError
 from matbench.measures.statistics import paired_effect
 from matbench.plans.plan import Method, Plan
+from matbench.results.comparable import SILENT, counted, is_enough
 from matbench.results.sweeps import is_swept
 from matbench.spec import Value, expand, read_scene, text
 
@@ -25,6 +26,7 @@ COLUMNS = (
     "effect_size",
     "scenes",
     "verdict",
+    "answered",
 )
 
 
@@ -68,7 +70,7 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
 
     All else is equal within a difference: the other parameters, scene, seed, region. Differences
     are averaged within a scene, over its options, seeds and the other factors' levels; effects are
-    over scenes.
+    over the scenes in which the region counts (`matbench.results.comparable.counted`) and nothing is missing.
 
     Parameters
     ----------
@@ -78,10 +80,15 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     Columns `COLUMNS`: `change` is the mean of level minus base in `unit`, `low` and `high` its
-    interval, and so on as in `matbench.measures.statistics.Effect`.
+    interval, and so on as in `matbench.measures.statistics.Effect`; `answered` is the per cent of the pixels that
+    the value is over, of the level that answers less, and below `matbench.measures.metrics.ENOUGH` the verdict is
+    `SILENT`.
     """
     methods = list({str(cell.method): cell.method for cell in plan.cells}.values())
     by_label = {(method.algorithm, method.changed): method for method in methods}
+    results = results[counted(results)]
+    if "answered" not in results:
+        results = results.assign(answered=float("nan"))
     rows = []
     for algorithm, levels in factors(methods).items():
         mine = results[results["algorithm"] == algorithm]
@@ -89,22 +96,38 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
             wide = _levels_side_by_side(mine, by_label, factor)
             for level in values[1:]:
                 base, other = text({factor: values[0]}), text({factor: level})
-                if base not in wide or other not in wide:
+                if base not in wide["value"] or other not in wide["value"]:
                     continue
-                change = (wide[other] - wide[base]).groupby(["region", "metric", "unit", "shown"], sort=False).mean()
-                for (region, metric, unit), over_scenes in change.groupby(["region", "metric", "unit"], sort=False):
-                    effect = paired_effect(over_scenes.to_list())
-                    numbers = asdict(effect)
-                    head = (algorithm, factor, base.partition("=")[2], other.partition("=")[2], region, metric, unit)
-                    rows.append((*head, *numbers.values(), effect.verdict))
+                change = _by_scene(wide["value"][other] - wide["value"][base])
+                both = wide["answered"][[base, other]].to_numpy(float)
+                shares = pd.DataFrame(both, wide.index).groupby(list(_HEADS), sort=False).mean().min(axis=1).to_dict()
+                for names, over_scenes in change.groupby(list(_HEADS), sort=False):
+                    effect, answered = paired_effect(over_scenes.to_list()), float(shares[names])
+                    verdict = effect.verdict if is_enough(answered) else SILENT
+                    head = (algorithm, factor, base.partition("=")[2], other.partition("=")[2], *names)
+                    rows.append((*head, *asdict(effect).values(), verdict, answered))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
+_HEADS = ("region", "metric", "unit")
+
+
+def _by_scene(changes: pd.Series) -> pd.Series:
+    """Means within each scene, over all else that is equal within a change.
+
+    Where a scene's option or a seed lacks a value, it is not averaged away; a combination of the other factors may.
+    """
+    groups = changes.groupby([*_HEADS, "shown", "rest"], sort=False)
+    whole = groups.mean().where(groups.count() == groups.size())
+    return whole.groupby([*_HEADS, "shown"], sort=False).mean()
+
+
 def _levels_side_by_side(results: pd.DataFrame, methods: Mapping[tuple[str, str], Method], factor: str) -> pd.DataFrame:
-    """One column for each level of the factor; the index names all that is equal within a row."""
+    """One column for each level of the factor, of `value` and of `answered`; the index names all that is equal."""
     labels = list(zip(results["algorithm"], results["params"], strict=True))
     level = [text({factor: methods[label].params[factor]}) for label in labels]
     rest = [text({k: v for k, v in methods[label].params.items() if k != factor}) for label in labels]
     shown = results["scene"].map(lambda scene: read_scene(str(scene)).name)  # noisy or in half size, it is one scene
     keys = ["rest", "shown", "scene", "seed", "region", "metric", "unit"]
-    return results.assign(level=level, rest=rest, shown=shown).set_index([*keys, "level"])["value"].unstack("level")
+    known = results.assign(level=level, rest=rest, shown=shown)
+    return known.pivot(index=keys, columns="level", values=["value", "answered"])

@@ -24,6 +24,8 @@ class Repeats:
         Share of a map's pixels that are not always the same.
     failed
         A repeat that did not end well, if one did not.
+    timed
+        The solves whose seconds count: of those that ended well the ones that nothing disturbed, if there are any.
     """
 
     cell: Cell
@@ -32,6 +34,7 @@ class Repeats:
     answers: int
     differ: float = 0.0
     failed: tuple[Cell, Outcome] | None = None
+    timed: tuple[Outcome, ...] = ()
 
     def __str__(self) -> str:
         if self.answers > 1:
@@ -51,12 +54,14 @@ def judged(cell: Cell, asked: int, solves: Iterable[Solved]) -> Repeats:
     """What came of a cell that is asked for several times: of its maps two are held at once."""
     first: Solved | None = None
     solved, answers, alike = 0, set[str](), ""
+    timed: list[Outcome] = []
     failed: tuple[Cell, Outcome] | None = None
     unlike: NDArray[np.bool_] = np.zeros(1, np.bool_)  # pixel by pixel, of the maps of all views
     for one in solves:
         if one.outcome is None:
             continue
         solved += one.outcome.status == "ok"
+        timed += [one.outcome] if one.outcome.status == "ok" and one.outcome.seconds is not None else []
         answers |= {one.outcome.maps} - {""}
         if one.cell.repeat and one.outcome.status not in FINAL and failed is None:
             failed = one.cell, one.outcome
@@ -65,7 +70,8 @@ def judged(cell: Cell, asked: int, solves: Iterable[Solved]) -> Repeats:
             alike = one.outcome.maps
         elif one.maps and first is not None and one.outcome.maps != alike:
             unlike = unlike | _unlike(first, one)
-    return Repeats(cell, asked, solved, len(answers), float(unlike.mean()), failed)
+    timed = [outcome for outcome in timed if outcome.alone and not outcome.doubt] or timed
+    return Repeats(cell, asked, solved, len(answers), float(unlike.mean()), failed, tuple(timed))
 
 
 def _unlike(one: Solved, other: Solved) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import chain
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from matbench.errors import UserError, unknown
 from matbench.measures.metrics import Metric, score, value_of
 from matbench.measures.prediction import PredictionMetric, differences
-from matbench.measures.volume_metrics import VolumeMetric, reliability
+from matbench.measures.volume_metrics import VolumeMetric, reliability, told
 from matbench.measures.volumes import StoredVolume, rays_of
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
@@ -23,7 +24,19 @@ from matbench.scene import Scene
 
 AnyMetric = Metric | VolumeMetric | PredictionMetric
 
-RESULT_COLUMNS = ("algorithm", "params", "scene", "view", "seed", "region", "metric", "value", "unit", "pixels")
+RESULT_COLUMNS = (
+    "algorithm",
+    "params",
+    "scene",
+    "view",
+    "seed",
+    "region",
+    "metric",
+    "value",
+    "unit",
+    "pixels",
+    "answered",
+)
 CELL_COLUMNS = (
     "algorithm",
     "params",
@@ -44,6 +57,20 @@ CELL_COLUMNS = (
     "machine",
     "maps",
     "repeats",
+    "seconds_least",
+    "seconds_most",
+)
+_NUMBERS = (
+    "seed",
+    "seconds",
+    "warmup_seconds",
+    "peak_mb",
+    "threads",
+    "alone",
+    "processor_seconds",
+    "others_seconds",
+    "seconds_least",
+    "seconds_most",
 )
 RELIABILITY_COLUMNS = ("algorithm", "params", "scene", "seed", "materiality", "observed", "points")
 
@@ -120,9 +147,12 @@ class Tables:
     results
         Columns `RESULT_COLUMNS`, one row for each cell that is ok, region of the reference view and metric: shares
         in per cent of `pixels`, errors in pixels of the pair. Volumes have rows where they were kept. The prediction
-        of a view held out has one region, ``all``, and that view's label.
+        of a view held out has one region, ``all``, and that view's label. `answered` is the per cent of the pixels
+        that the value is over, 100 where silence counts against a method.
     cells
-        Columns `CELL_COLUMNS`, one row for each cell that is scored: what became of it and what it cost.
+        Columns `CELL_COLUMNS`, one row for each cell that is scored: what became of it and what it cost. Of a cell
+        that is solved several times, `seconds` is the median, of those solves that nothing disturbed if there are
+        any, and the shortest and the longest stand beside it.
     reliability
         The reliability curve of every volume that was kept, over the reference view's known truth: algorithm, params,
         scene, seed, and the columns of `matbench.measures.volume_metrics.reliability`.
@@ -180,8 +210,8 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
 def read(folder: Path, unsteady: tuple[str, ...], outcomes: Mapping[str, Outcome]) -> Tables:
     """What `tables` gave when it was written to a run folder: the same types, and the same numbers to the last bit."""
     return Tables(
-        _read(folder / "results.csv", RESULT_COLUMNS, ("seed", "value", "pixels")),
-        _read(folder / "cells.csv", CELL_COLUMNS, ("seed", "seconds", "warmup_seconds", "peak_mb", "threads", "alone")),
+        _read(folder / "results.csv", RESULT_COLUMNS, ("seed", "value", "pixels", "answered")),
+        _read(folder / "cells.csv", CELL_COLUMNS, _NUMBERS),
         _read(folder / "reliability.csv", RELIABILITY_COLUMNS, ("seed", "materiality", "observed", "points")),
         unsteady,
         outcomes,
@@ -230,8 +260,9 @@ def _of_maps(cell: Cell, scene: Scene, estimate: NDArray[np.float32]) -> Iterato
     for region, mask in scene.scored_regions.items():
         truth, head = scene.truth[scene.ref], _head(cell, scene.labels[scene.ref], region)
         values = score(estimate, truth, mask, scene.pair_steps, used, scene)
-        pixels = int((mask & np.isfinite(truth)).sum())
-        yield from ((*head, m.name, values[m.name], m.unit, pixels) for m in used)
+        known = mask & np.isfinite(truth)
+        pixels, answered = int(known.sum()), _percent(np.isfinite(estimate[known]))
+        yield from ((*head, m.name, values[m.name], m.unit, pixels, _over(m, answered)) for m in used)
 
 
 def _of_volumes(cell: Cell, scene: Scene, kept: StoredVolume | None) -> Iterator[tuple[object, ...]]:
@@ -241,14 +272,25 @@ def _of_volumes(cell: Cell, scene: Scene, kept: StoredVolume | None) -> Iterator
     masks = scene.scored_regions
     for region, rays in zip(masks, rays_of(kept, scene, masks.values()), strict=True):
         head, pixels = _head(cell, scene.labels[scene.ref], region), len(rays.surface)
-        yield from ((*head, m.name, value_of(m, rays, pixels), m.unit, pixels) for m in used)
+        answered = told(rays) if pixels else float("nan")
+        yield from ((*head, m.name, value_of(m, rays, pixels), m.unit, pixels, _over(m, answered)) for m in used)
 
 
 def _predicted(cell: Cell, scene: Scene, estimate: NDArray[np.float32]) -> list[tuple[object, ...]]:
     assert scene.held_out is not None, "the caller has looked"  # noqa: S101
     found, head = differences(scene, estimate), _head(cell, scene.held_out.label, "all")
     used = [metric for metric in metrics() if isinstance(metric, PredictionMetric)]
-    return [(*head, m.name, value_of(m, found, len(found)), m.unit, len(found)) for m in used]
+    answered = _percent(~np.isnan(found[:, 0]))
+    return [(*head, m.name, value_of(m, found, len(found)), m.unit, len(found), _over(m, answered)) for m in used]
+
+
+def _percent(mask: NDArray[np.bool_]) -> float:
+    return 100.0 * float(mask.mean()) if mask.size else float("nan")
+
+
+def _over(metric: AnyMetric, answered: float) -> float:
+    """Per cent of the pixels that a metric is over."""
+    return answered if metric.answered_only else 100.0
 
 
 def _curve(solved: Solved, scene: Scene) -> list[pd.DataFrame]:
@@ -274,7 +316,7 @@ def _line(solved: Solved, repeats: Repeats | None) -> tuple[object, ...]:
     cell, outcome, place = solved.cell, solved.outcome, solved.place
     head = (cell.method.algorithm, cell.method.changed, cell.scene, cell.seed)
     if outcome is None:
-        return *head, "interrupted", *[None] * 7, "", "", "not computed yet", cell.key, "", "", ""
+        return *head, "interrupted", *[None] * 7, "", "", "not computed yet", cell.key, "", "", "", None, None
     status, reason = outcome.status, outcome.reason
     if repeats is not None and repeats.failed is not None and status == "ok":
         repeat, failed = repeats.failed
@@ -282,7 +324,11 @@ def _line(solved: Solved, repeats: Repeats | None) -> tuple[object, ...]:
     if reason and status != "skipped":
         reason += _log_of(place)
     told = (cell.key, outcome.ran_on.get("machine", ""), outcome.maps, str(repeats or ""))
-    cost = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb, outcome.threads, outcome.alone)
-    share = (outcome.processor_seconds, outcome.others_seconds, outcome.doubt)
+    counted = repeats.timed if repeats is not None and repeats.timed else (outcome,)
+    seconds = sorted(one.seconds for one in counted if one.seconds is not None)
+    ends = (seconds[0], seconds[-1]) if len(seconds) > 1 else (None, None)
+    taken = median(seconds) if seconds else None
+    cost = (taken, outcome.warmup_seconds, outcome.peak_mb, outcome.threads, counted[0].alone)
+    share = (outcome.processor_seconds, outcome.others_seconds, counted[0].doubt)
     work = " ".join(f"{name}={count}" for name, count in outcome.work.items())
-    return *head, status, *cost, *share, work, reason, *told
+    return *head, status, *cost, *share, work, reason, *told, *ends

@@ -14,8 +14,9 @@ import pandas as pd
 from attrs import frozen
 
 from matbench import spec
-from matbench.measures.statistics import FEW, Effect, intervals
+from matbench.measures.statistics import FEW, intervals, paired_effects
 from matbench.plans.plan import Method, Plan
+from matbench.results.comparable import SILENT, counted, is_enough
 from matbench.spec import Spec
 
 LEAST_VALUES = 3
@@ -39,6 +40,7 @@ COLUMNS = (
     "change_high",
     "scenes",
     "verdict",
+    "answered",
 )
 
 
@@ -68,7 +70,9 @@ class Sweep:
         Columns `COLUMNS`. `params` are those that differ from their defaults, without the option
         itself. `mean` over scenes with its interval, NaN below `FEW` scenes; `change` is the paired
         difference from the first value, with its interval and verdict as in
-        `matbench.measures.statistics.Effect`. Scenes in which a region is empty do not count in it.
+        `matbench.measures.statistics.Effect`. `answered` is the per cent of the pixels that the mean is over; where
+        that is less than `matbench.measures.metrics.ENOUGH` at either end of a change, its verdict is `SILENT`. A
+        region counts on the scenes where it does so at every value (`matbench.results.comparable.counted`).
     """
 
     option: str
@@ -193,7 +197,10 @@ def _sweeps_of(option: str, of: str, cells: pd.DataFrame, results: pd.DataFrame)
 def _sweep(
     option: str, of: str, setting: str, values: tuple[float, ...], cells: pd.DataFrame, results: pd.DataFrame
 ) -> Sweep:
-    scored = results.assign(params=results["params"].fillna("")).rename(columns={"value": "score"})
+    kept = results["value"].where(counted(results))
+    answered = results.get("answered", pd.Series(nan, results.index))
+    scored = results.assign(params=results["params"].fillna(""), score=kept, answered=answered)
+    scored = scored.drop(columns="value")
     joined = cells.merge(scored, on=["algorithm", "params", "scene", "seed"], how="left")
     done = joined["metric"].notna().groupby(joined["base"], sort=False).all()
     good = joined[joined["base"].map(done)]
@@ -231,14 +238,19 @@ def _without(method: Method, option: str) -> str:
 def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
     """The means of every curve and value over the scenes that have all of them."""
     heads = ["region", "metric", "unit"]
-    groups = good.groupby([*heads, "curve", "value", "base"], sort=False)["score"]
-    per_scene = groups.mean().where(groups.count() == groups.size()).unstack("base").sort_index(level="value")
+    groups = good.groupby([*heads, "curve", "value", "base"], sort=False)
+    scores = groups["score"].mean().where(groups["score"].count() == groups.size())
+    per_scene = scores.unstack("base").sort_index(level="value")
+    # a curve without any score, as of a method that never answers, takes no scene from the others
+    per_scene = per_scene[per_scene.notna().any(axis=1).groupby([*heads, "curve"]).transform("all")]
+    shares = groups["answered"].mean().unstack("base")
     has = per_scene.notna().groupby(heads).transform("all")
     rows: list[tuple[object, ...]] = []
     for known in set(map(tuple, has.to_numpy().tolist())):  # at most a few: all at once is much faster
         part = per_scene.loc[(has == list(known)).all(axis=1), list(known)]
         if part.shape[1]:  # else the region is empty
-            for (*head, curve, value), line in zip(part.index, _lines(part), strict=True):
+            over = shares.loc[part.index, part.columns].mean(axis=1)
+            for (*head, curve, value), line in zip(part.index, _lines(part, over), strict=True):
                 rows.append((*labels[str(curve)], value, *head, *line))
     found = pd.DataFrame(rows, columns=list(COLUMNS))
     places = {"algorithm": [a for a, _ in labels.values()], "params": [p for _, p in labels.values()]}
@@ -247,18 +259,26 @@ def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.Dat
     return found.iloc[np.lexsort([found["value"], *order[::-1]])].reset_index(drop=True)
 
 
-def _lines(scores: pd.DataFrame) -> list[tuple[object, ...]]:
-    """What `COLUMNS` say from `mean` on, for each row of curves by increasing values x scenes."""
+def _lines(scores: pd.DataFrame, answered: pd.Series) -> list[tuple[object, ...]]:
+    """What `COLUMNS` say from `mean` on, for each row of curves by increasing values x scenes.
+
+    Parameters
+    ----------
+    answered
+        Of each row, the per cent of the pixels that its scores are over.
+    """
     numbers, count = scores.to_numpy(np.float64), scores.shape[1]
     curves = scores.groupby(["region", "metric", "unit", "curve"], sort=False)
-    changes = numbers - curves.transform("first").to_numpy(np.float64)
-    nothing = np.full((2, 2 * len(scores)), nan)
-    low, high = intervals(np.concatenate([numbers, changes])) if count >= FEW else nothing
-    means, shifts = numbers.mean(axis=1), changes.mean(axis=1)
-    (low, least), (high, most) = np.split(low, 2), np.split(high, 2)
+    effects = paired_effects(list(numbers - curves.transform("first").to_numpy(np.float64)))
+    means, nothing = numbers.mean(axis=1), np.full((2, len(scores)), nan)
+    low, high = intervals(numbers) if count >= FEW else nothing
+    least, most = zip(*((e.low, e.high) for e in effects), strict=True) if count >= FEW else nothing
+    shifts = [effect.mean for effect in effects]
     first = scores.index.get_level_values("value") == scores.index.get_level_values("value").min()
+    lowest = np.fmin(answered, answered.groupby(["region", "metric", "unit", "curve"], sort=False).transform("first"))
     verdicts = [
-        "" if is_first else Effect(mean, lower, upper, nan, count).verdict
-        for is_first, mean, lower, upper in zip(first, shifts, least, most, strict=True)
+        "" if is_first else effect.verdict if is_enough(share) else SILENT
+        for is_first, effect, share in zip(first, effects, lowest, strict=True)
     ]
-    return list(zip(means, low, high, shifts, least, most, [count] * len(scores), verdicts, strict=True))
+    count_each = [count] * len(scores)
+    return list(zip(means, low, high, shifts, least, most, count_each, verdicts, answered, strict=True))

@@ -8,17 +8,19 @@
 
   // ---- tables -------------------------------------------------------------------------------
 
-  // An entry is [number or null, as shown, place], as the tables on the Python side made it.
-  const fill = (cell, [value, shown, place]) => {
+  // An entry is [number or null, as shown, place, what is said beside it], as the tables on the Python side made it.
+  const fill = (cell, [value, shown, place, said]) => {
     cell.dataset.v = value ?? "";
     cell.textContent = shown;
-    cell.className = "n" + (place === 1 ? " best" : place === 2 ? " second" : "");
-    if (place) {
-      const words = document.createElement("span");
-      words.className = "hidden";
-      words.textContent = place === 1 ? " (best)" : " (second best)";
+    cell.className = "n" + (place === 1 ? " best" : place === 2 ? " second" : place < 0 ? " aside" : "");
+    const add = (kind, text) => {
+      const words = document.createElement(kind);
+      words.textContent = text;
       cell.append(words);
-    }
+      return words;
+    };
+    if (said) cell.append(" "), add("small", said);
+    if (place > 0) add("span", place === 1 ? " (best)" : " (second best)").className = "hidden";
   };
 
   const sort = (table, column, direction, size = (v) => v) => {
@@ -28,7 +30,8 @@
       if (cell.dataset.v === undefined) return cell.textContent;
       return cell.dataset.v === "" ? NaN : size(Number(cell.dataset.v));
     };
-    const rows = [...table.tBodies[0].rows].map((row) => ({ row, key: key(row), last: row.matches(".unranked") }));
+    const isLast = (row) => row.matches(".unranked") || row.cells[column].matches(".aside");
+    const rows = [...table.tBodies[0].rows].map((row) => ({ row, key: key(row), last: isLast(row) }));
     rows.sort((a, b) => {
       if (a.last !== b.last) return a.last ? 1 : -1; // not ranked: always below
       if (typeof a.key === "string") return sign * a.key.localeCompare(b.key);
@@ -60,13 +63,15 @@
   const [score, threshold, region, reference] = ["#score", "#threshold", "#region", "#reference"].map((id) => $(id));
   const metricOf = (family) => family.replace("@", threshold?.value ?? "");
   const merits = { lower: (v) => v, higher: (v) => -v, zero: Math.abs }; // less is better of what these give
+  const asideOf = (metric, where) => data.aside[metric][where] ?? [];
   const best = (metric, where) => {
     const means = data.means[metric][where];
-    const known = data.references.filter((method) => means[method][0] !== null);
+    const known = data.references.filter((method) => means[method][0] !== null && !asideOf(metric, where).includes(method));
     const merit = merits[data.better[metric]];
     return known.reduce((a, b) => (merit(means[b][0]) < merit(means[a][0]) ? b : a), known[0]);
   };
-  const signed = (value, digits = 2) => (value === null ? "–" : (value < 0 ? "" : "+") + value.toFixed(digits));
+  // A difference as shown, taken the other way round; what is exactly nothing stays +0.00.
+  const turnText = (shown) => (/^[+-]/.test(shown) ? (shown[0] === "+" ? "-" : "+") + shown.slice(1) : shown);
 
   const showBest = (metric) => {
     const table = $("#best-table");
@@ -76,7 +81,9 @@
       const name = metricOf(head.dataset.score);
       $("span", head).textContent = name;
       for (const row of table.tBodies[0].rows) fill(row.cells[i], data.means[name][region.value][row.dataset.method]);
+      table.tFoot.rows[0].cells[i].textContent = data.counts[name][region.value];
     });
+    table.tFoot.rows[0].cells[1].textContent = data.counts[metric][region.value];
     for (const row of table.tBodies[0].rows) fill(row.cells[1], data.ranks[metric][region.value][row.dataset.method]);
     const head = columns.find((one) => one.dataset.score === score.value);
     const better = data.better[metric];
@@ -89,17 +96,25 @@
     const other = reference.value || best(metric, region.value);
     const at = data.methods.indexOf(other);
     const turn = (v) => (v === null ? null : -v);
-    const rows = data.differences[metric][region.value].flatMap(([method, from, mean, low, high, size, scenes]) => {
-      if (from === at) return [{ method, mean, low, high, size, scenes }];
-      return method === at ? [{ method: from, mean: turn(mean), low: turn(high), high: turn(low), size: turn(size), scenes }] : [];
+    const turned = (value, shown) => (value === 0 ? shown : turnText(shown));
+    const rows = data.differences[metric][region.value].flatMap(([method, from, mean, low, high, scenes, ...shown]) => {
+      if (from === at) return [{ method, mean, low, high, scenes, shown }];
+      if (method !== at) return [];
+      const back = [turned(mean, shown[0]), turned(high, shown[2]), turned(low, shown[1]), turned(mean, shown[3])];
+      return [{ method: from, mean: turn(mean), low: turn(high), high: turn(low), scenes, shown: back }];
     });
+    const aside = asideOf(metric, region.value);
     rows.sort((a, b) => a.method - b.method);
     const ends = [0, ...rows.flatMap((r) => [r.mean ?? 0, r.low ?? 0, r.high ?? 0])];
     const [least, most] = [Math.min(...ends), Math.max(...ends)];
     const place = (value) => String(3 + (94 * ((value ?? 0) - least)) / (most - least || 1));
     const better = data.better[metric] === "higher" ? 1 : -1;
-    const verdict = (r) =>
-      r.scenes < data.few ? "too few scenes" : r.low * r.high <= 0 ? "undecided" : r.mean * better > 0 ? "better" : "worse";
+    const verdict = (r) => {
+      if (aside.includes(other) || aside.includes(data.methods[r.method])) return data.silent;
+      if (r.scenes < data.few) return "too few scenes";
+      if (!(r.low > 0 || r.high < 0)) return "undecided";
+      return r.mean * better > 0 ? "better" : "worse";
+    };
     $("#reference-name").textContent = other;
     table.tBodies[0].replaceChildren(
       ...rows.map((r) => {
@@ -108,8 +123,8 @@
         head.scope = "row";
         head.textContent = data.methods[r.method];
         row.append(head);
-        const interval = r.low === null ? "–" : `${signed(r.low)} .. ${signed(r.high)}`;
-        const texts = [signed(r.mean), interval, null, signed(r.size, 1), String(r.scenes), verdict(r)];
+        const interval = r.low === null ? "–" : `${r.shown[1]} .. ${r.shown[2]}`;
+        const texts = [r.shown[0], interval, null, r.shown[3], String(r.scenes), verdict(r)];
         texts.forEach((text, i) => {
           const cell = row.insertCell();
           if (text !== null) cell.textContent = text;
@@ -130,6 +145,8 @@
     for (const row of $("#regions-table").tBodies[0].rows) {
       data.regions.forEach((name, i) => fill(row.cells[i + 1], data.means[metric][name][row.dataset.method]));
     }
+    const counts = $("#regions-table").tFoot.rows[0].cells;
+    data.regions.forEach((name, i) => (counts[i + 1].textContent = data.counts[metric][name]));
     const entries = data.scenes[metric][region.value];
     for (const row of $("#scenes-table").tBodies[0].rows) {
       entries[Number(row.dataset.index)].forEach((entry, i) => fill(row.cells[i + 1], entry));

@@ -19,7 +19,7 @@ VALUES = (0.0, 2.0, 4.5)
 
 def sweep(scenes: int = 2, low: float = float("nan")) -> Sweep:
     rows = [
-        (a, p, v, region, metric, "%", 10 * i + v, low, low + 1, v, low, low + 2, scenes, "higher" if v else "")
+        (a, p, v, region, metric, "%", 10 * i + v, low, low + 1, v, low, low + 2, scenes, "higher" if v else "", 100.0)
         for i, (a, p) in enumerate(METHODS)
         for region in ("occ", "all", "nonocc", "mine")
         for metric in ("bad_1", "total_bad_1")
@@ -35,9 +35,9 @@ def _frame(rows: list[tuple[object, ...]]) -> pd.DataFrame:
 
 def test_the_lines_are_those_of_one_metric_in_the_regions_order() -> None:
     lines = curves.lines(sweep())
-    assert list(lines.columns) == ["region", "method", "0", "2", "4.5", "change", "interval", "verdict"]
+    assert list(lines.columns) == ["region", "method", "0", "2", "4.5", "change", "interval", "scenes", "verdict"]
     assert lines.region.tolist() == ["nonocc", "nonocc", "all", "all", "occ", "occ", "mine", "mine"]
-    assert lines.loc[1].tolist() == ["nonocc", "<b>&[x=$1 y=_]", "10.00", "12.00", "14.50", "+4.50", "–", "higher"]
+    assert lines.loc[1].tolist() == ["nonocc", "<b>&[x=$1 y=_]", "10.00", "12.00", "14.50", "+4.50", "–", "2", "higher"]
     assert curves.lines(sweep(FEW, 1.0)).interval[0] == "+1.00 .. +3.00"
 
 
@@ -82,7 +82,9 @@ def test_the_figure_has_a_panel_per_region_a_curve_per_method_and_bands_where_sc
 
 def test_many_curves_have_names_that_do_not_touch() -> None:
     rows = [
-        (f"m{i}", "", v, "all", "total_bad_1", "%", 5 + i / 100, *[0.0] * 5, 2, "") for i in range(7) for v in VALUES
+        (f"m{i}", "", v, "all", "total_bad_1", "%", 5 + i / 100, *[0.0] * 5, 2, "", 100.0)
+        for i in range(7)
+        for v in VALUES
     ]
     figure = curves.figure(evolve(sweep(), curves=_frame(rows)))
     assert figure is not None
@@ -100,7 +102,15 @@ def test_the_terminal_has_the_same_numbers() -> None:
         "total_bad_1 (%) against noise (grey levels), 0 to 4.5, scenes with size=half, mean over 2 scenes; "
         "too few scenes to conclude"
     )
-    assert [column.header.plain for column in table.columns] == ["region", "method", "0", "2", "4.5", "change"]
+    assert [column.header.plain for column in table.columns] == [
+        "region",
+        "method",
+        "0",
+        "2",
+        "4.5",
+        "change",
+        "scenes",
+    ]
     assert [cell.plain for cell in table.columns[4].cells] == ["4.50", "14.50"] * 3
     assert curves.terminal([]) == []
 

@@ -8,11 +8,26 @@ from matbench.results.ablation import COLUMNS
 
 def table() -> pd.DataFrame:
     rows = [
-        ("m", "pairs", "all", "some_x&50%", region, "total_bad_1", "%", -1.234, -2.0, -0.5, -1.5, 8, "lower")
+        ("m", "pairs", "all", "some_x&50%", region, "total_bad_1", "%", -1.234, -2.0, -0.5, -1.5, 8, "lower", 100.0)
         for region in ("nonocc", "all", "occ")
     ]
     rows += [
-        ("m", "pairs", "all", "some_x&50%", "all", "avg", "px", 0.5, float("nan"), float("nan"), float("nan"), 1, "x")
+        (
+            "m",
+            "pairs",
+            "all",
+            "some_x&50%",
+            "all",
+            "avg",
+            "px",
+            0.5,
+            float("nan"),
+            float("nan"),
+            float("nan"),
+            1,
+            "x",
+            100.0,
+        )
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 

@@ -77,7 +77,8 @@ def test_an_archive_checks_itself_anywhere(tmp_path: Path, capsys: pytest.Captur
 
 def _better(content: bytes) -> bytes:
     lines = content.decode().splitlines(keepends=True)
-    return "".join([lines[0], lines[1].replace(lines[1].split(",")[-3], "0.5"), *lines[2:]]).encode()
+    value = lines[1].split(",")[lines[0].split(",").index("value")]
+    return "".join([lines[0], lines[1].replace(value, "0.5"), *lines[2:]]).encode()
 
 
 def _changed(

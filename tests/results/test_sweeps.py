@@ -29,7 +29,7 @@ def run(
         (one,) = parse(cell.scene)
         value = score(cell.method, one.name, one.options) + cell.seed
         head = (cell.method.algorithm, cell.method.changed, cell.scene, "0", cell.seed)
-        rows += [(*head, "all", "bad_1", value, "%", 9), (*head, "occ", "bad_1", 2 * value, "%", 4)]
+        rows += [(*head, "all", "bad_1", value, "%", 900), (*head, "occ", "bad_1", 2 * value, "%", 400)]
     columns = ["algorithm", "params", "scene", "view", "seed", "region", "metric", "value", "unit", "pixels"]
     return Plan(cells, spellings=spellings), pd.DataFrame(rows, columns=columns)
 
@@ -177,7 +177,7 @@ def test_patterns_that_sweep_are_known_before_anything_runs() -> None:
 def test_regions_that_move_and_methods_that_use_less_are_named() -> None:
     methods = [method("a", views=5), method("b", views=0), method("c", views=9)]
     plan, results = run(methods, ["d/s0[views=3,5,9]"], lambda *_: 1.0)
-    results.loc[(results.region == "occ") & (results.scene == "d/s0[views=9]"), "pixels"] = 5
+    results.loc[(results.region == "occ") & (results.scene == "d/s0[views=9]"), "pixels"] = 500
     (sweep,) = sweeps(plan, results)
     assert sweep.moving == ("occ",)
     assert dict(sweep.limits) == {"a[views=5]": 5}

@@ -1,0 +1,44 @@
+"""Intervals: exact for few scenes, the same for all who ask, whatever the order and the sign."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from matbench.measures.statistics import EXACT, intervals, paired_effect, paired_effects
+
+
+@pytest.mark.parametrize("scenes", range(2, 7))
+def test_few_scenes_are_resampled_in_every_way(scenes: int) -> None:
+    rows = np.random.default_rng(scenes).normal(1, 2, (4, scenes))
+    for row, low, high in zip(rows, *intervals(rows), strict=True):
+        means = np.mean(list(product(row, repeat=scenes)), axis=1)
+        assert [low, high] == pytest.approx(np.quantile(means, [0.025, 0.975]), abs=1e-12)
+
+
+def test_by_hand() -> None:
+    """Of 0 and 1 the four resamples have the means 0, 1/2, 1/2, 1: 0.025 of the way along three gaps is 0.0375."""
+    low, high = intervals(np.array([0.0, 1.0]))
+    assert (low, high) == (pytest.approx(0.0375), pytest.approx(0.9625))
+
+
+def test_numbers_of_any_size_have_an_effect() -> None:
+    small, large = paired_effects([[1.0, 2.0, 4.0], [1e307, 2e307, 4e307]])
+    assert large.mean / 1e307 == pytest.approx(small.mean) == pytest.approx(7 / 3)
+    assert large.low / 1e307 == pytest.approx(small.low)
+    assert large.size == pytest.approx(small.size)
+
+
+@pytest.mark.parametrize("scenes", [3, EXACT, EXACT + 1, 20])
+def test_neither_order_nor_sign_nor_company_changes_an_interval(scenes: int) -> None:
+    random = np.random.default_rng(0)
+    rows = random.normal(0, 1, (50, scenes)).round(2)
+    low, high = intervals(rows)
+    shuffled = random.permuted(rows, axis=1)
+    for found in (intervals(shuffled), [-end for end in intervals(-shuffled)[::-1]]):
+        assert np.array_equal(found[0], low)
+        assert np.array_equal(found[1], high)
+    for row, a, b in zip(rows, low, high, strict=True):
+        assert paired_effect(list(row[::-1])).low == a
+        assert paired_effect(list(-row)).low == -b
+    assert [e.high for e in paired_effects([*rows[:7], [1.0, 2.0], *rows[7:]])][8:] == high[7:].tolist()
