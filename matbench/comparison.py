@@ -4,7 +4,7 @@ import operator
 import shlex
 import sys
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from matbench.measures.prediction import instead_of_truth
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan, make_plan, methods
-from matbench.plans.record_option import RecordOption
+from matbench.plans.record_option import MOST_ROWS, RecordOption
 from matbench.plans.settings import Settings
 from matbench.results import freshness, scores
 from matbench.results.scores import Tables
@@ -214,13 +214,18 @@ class Comparison:
                 histories={key: outcome.history for key, outcome in outcomes.items() if outcome is not None},
                 parameters={(c.method.algorithm, c.method.changed): c.method.params for c in self.plan.cells},
                 groups={c.method.algorithm: _groups(c.method.algorithm) for c in self.plan.cells},
-                rows=self.settings.record.rows if self.settings.record is not None else (),
+                rows=self._rows(tables.outcomes.values()),
             ),
         )
         if (made := freshness.made(self.store)) is not None:
             drawn = freshness.page_digest(self.store, self._asked(ablation is not None))
             evolve(made, page=drawn).write(self.store)
         return path
+
+    def _rows(self, outcomes: Iterable[Outcome]) -> tuple[int, ...]:
+        """The image rows whose slices the page shows: those asked for now, and those that recordings show."""
+        options = [self.settings.record, *(outcome.recorded for outcome in outcomes)]
+        return tuple(sorted({row for option in options if option is not None for row in option.rows})[:MOST_ROWS])
 
     def _asked(self, is_ablation: bool) -> list[object]:
         """What decides the page besides the tables and what they are made from."""
@@ -429,7 +434,7 @@ def compare(
     repeats
         How often every cell is solved; more than once shows whether a method repeats itself.
     settings
-        Limits, cells at once, a cluster, which cells: the fields of `Settings` that are no parameters here.
+        Limits, cells at once, a cluster, which cells. What is given by a parameter of its own goes before it.
 
     Returns
     -------
@@ -441,13 +446,18 @@ def compare(
     UserError
         For anything asked for that cannot be; nothing is written then.
     """
-    wanted = record if isinstance(record, RecordOption) else RecordOption() if record else None
+    wanted = record if isinstance(record, RecordOption) else RecordOption() if record else settings.record
     if wanted is not None and row is not None:
         wanted = evolve(wanted, rows=[row] if isinstance(row, int) else row)
     comparison = prepare(
         algorithms,
         scenes,
-        settings=evolve(settings, data=Path(data) if data is not None else None, record=wanted, volumes=volumes),
+        settings=evolve(
+            settings,
+            data=Path(data) if data is not None else settings.data,
+            record=wanted,
+            volumes=volumes or settings.volumes,
+        ),
         out=out,
         seed=seed,
         plugin=plugin,

@@ -38,7 +38,7 @@ class PageSlice:
 
 def rows_of(scene: Scene, asked: Sequence[int]) -> list[int]:
     """The rows shown: those asked for, the middle one, and those a quarter of the height above and below it."""
-    wanted = [min(row, scene.height - 1) for row in asked]
+    wanted = [min(max(row, 0), scene.height - 1) for row in asked]
     return list(dict.fromkeys([*wanted, scene.height // 2, scene.height // 4, 3 * scene.height // 4]))
 
 

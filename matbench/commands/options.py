@@ -74,6 +74,13 @@ class Options:
             "default what is not done."
         ),
     ] = None
+    steady: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            help="Solve again, at the end and one at a time, what others disturbed: then all seconds compare.",
+        ),
+    ] = False
     repeats: Annotated[str, Parameter(help="Solve every cell so often: does a method repeat itself?")] = "1"
     dry_run: Annotated[bool, Parameter(negative="", help="Only say what would run, and why.")] = False
     quiet: Annotated[
@@ -107,6 +114,7 @@ class Options:
             isolation=self.isolation,
             dask=self.dask,
             only=self.only,
+            steady=self.steady,
         )
 
     @property

@@ -43,6 +43,7 @@ class Progress:
     _running: dict[str, tuple[Cell, float]] = field(factory=dict)  # key -> cell, and when it started
     _waiting: dict[str, Cell] = field(init=False)
     _took: dict[str, list[float]] = field(factory=dict)
+    _ended: set[str] = field(factory=set)
     _at_once: int = 1
     _live: Live | None = None
 
@@ -65,6 +66,8 @@ class Progress:
         """Take note that a cell starts or ends. Several may start before one ends."""
         if event == "start":
             self._waiting.pop(cell.key, None)
+            if cell.key in self._ended:  # it is solved once more (`Settings.steady`)
+                self.done -= 1
             self._running[cell.key] = (cell, self.clock())
             self._at_once = max(self._at_once, len(self._running))
         elif outcome is not None:
@@ -73,6 +76,7 @@ class Progress:
                 _, began = self._running.pop(cell.key)
                 self._took.setdefault(cell.method.algorithm, []).append(self.clock() - began)
             self.done += 1
+            self._ended.add(cell.key)
             self.failed += outcome.status not in FINAL
             self._say(cell, outcome)
 

@@ -42,6 +42,9 @@ class Settings:
     dask
         The address of the Dask scheduler that hands out the cells; ``"local"`` for a cluster of `jobs`
         workers on this machine; None for no cluster.
+    steady
+        Solve those cells once more, one at a time and at the end, whose seconds are in doubt because others took the
+        processors meanwhile.
 
     Raises
     ------
@@ -59,6 +62,7 @@ class Settings:
     threads: int | None = field(default=None, converter=limits.threads)
     isolation: str = field(default="process", converter=limits.isolation)
     dask: str | None = None
+    steady: bool = False
 
     def threads_each(self) -> int:
         """How many threads each method is given on this machine."""

@@ -96,6 +96,11 @@ class Outcome:
     others_seconds: float | None = None
     doubt: str = field(default="", converter=_one_line)
 
+    @property
+    def is_doubtful(self) -> bool:
+        """Was it timed while others, be they other cells, took the processors? Then `seconds` cannot be compared."""
+        return self.status == "ok" and (bool(self.doubt) or not self.alone)
+
 
 @frozen(eq=False)
 class Solved:
@@ -325,6 +330,13 @@ class Store:
         if isinstance(error, OSError) and error.errno is not None and error.errno not in _ABSENT:
             raise FolderLost.of(self.folder, error) from error
 
+    def fingerprint(self, cell: Cell) -> str:
+        """SHA-256 of what is stored of a cell, its maps by their digest; empty where nothing is."""
+        try:
+            return sha256((self.cell(cell) / "cell.json").read_bytes()).hexdigest()
+        except OSError:
+            return ""
+
     def stale(self, plan: Plan) -> list[Cell]:
         """The stored cells that are none of the plan's: of other code, other pixels, other repeats."""
         current = {cell.key for cell in plan.cells}
@@ -447,7 +459,7 @@ def write_cell(
         arrays: dict[str, Any] = {f"view_{view}": values for view, values in disparity.items()}
         np.savez_compressed(draft / "disparity.npz", **arrays)
     maps = maps_digest(disparity) if disparity else outcome.maps
-    outcome = evolve(outcome, maps=maps, ran_on=provenance.ran_on())
+    outcome = evolve(outcome, maps=maps, ran_on={**provenance.ran_on(), **outcome.ran_on})
     facts = {"cell": _json.unstructure(cell), "outcome": _json.unstructure(outcome)}
     text = json.dumps(facts, indent=1, allow_nan=False)
     (draft / "cell.json").write_text(text, encoding="utf-8")

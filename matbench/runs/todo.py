@@ -64,6 +64,8 @@ def _lacks(cell: Cell, outcome: Outcome | None, store: Store, settings: Settings
     """What is not there of what was asked for; empty if all is."""
     if outcome is None:
         return "its files are damaged" if store.cell(cell).exists() else "not computed yet"
+    if settings.steady and outcome.is_doubtful:
+        return f"its seconds are in doubt: {outcome.doubt or 'other cells ran meanwhile'}"
     if cell.repeat:
         return ""
     if settings.volumes and outcome.has_volume and store.volume(cell) is None:

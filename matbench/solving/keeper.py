@@ -156,7 +156,9 @@ class Keeping:
             outcome = self._taken(job, draft, count, end)
         if outcome.status != "ok":
             _empty(draft)
-        write_cell(draft, job.cell, evolve(outcome, threads=job.threads, alone=job.alone))
+        ran_on = {"run folder": "read-only for methods" if self.is_confining else "within reach of methods"}
+        outcome = evolve(outcome, threads=job.threads, alone=job.alone, ran_on=ran_on)
+        write_cell(draft, job.cell, outcome)
         (draft / "log.txt").write_bytes(log.whole())
         return stays or outcome.status in FINAL or outcome.status == "timeout"
 

@@ -1,9 +1,11 @@
 """Computing the cells of a plan: each in a process of its own, here or on a cluster."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from multiprocessing.connection import wait
 from typing import Any, Literal
+
+from attrs import evolve
 
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
@@ -34,6 +36,8 @@ def run(
 
     Parameters
     ----------
+    todo
+        Those that are not done (`matbench.runs.todo`).
     preload
         Modules to import once for all cells besides the harness, such as those of the methods.
     listen
@@ -43,17 +47,9 @@ def run(
     ------
     FolderLost
         If cells cannot be written.
-
-    Parameters
-    ----------
-    todo
-        Those that are not done (`matbench.runs.todo`).
-    preload
-        Modules that are imported once for all cells, besides the harness, such as those of the methods.
-    listen
-        Told as each cell starts and ends.
     """
     told = listen or (lambda *_: None)
+    known = {cell.key: store.fingerprint(cell) for cell in plan.cells}
 
     def tell(event: Event, cell: Cell, outcome: Outcome | None) -> None:
         if outcome is not None and store.outcome(cell) != outcome:
@@ -62,18 +58,39 @@ def run(
             with store.building(cell) as draft:
                 write_cell(draft, cell, outcome)
                 (draft / "log.txt").touch()
+        if outcome is not None:
+            known[cell.key] = store.fingerprint(cell)
         told(event, cell, outcome)
 
     if not todo:
         return
     store.sweep()
-    with without_main(), kernel_cache_in_use():
-        if settings.dask is None:
-            _run_here(plan, store, settings, preload, todo, tell)
-        else:
-            from matbench.solving import cluster
+    try:
+        with without_main(), kernel_cache_in_use():
+            if settings.dask is not None:
+                from matbench.solving import cluster
 
-            cluster.run_cells(plan, store, settings, todo, tell)
+                cluster.run_cells(plan, store, settings, todo, tell)
+                return
+            _run_here(plan, store, settings, preload, todo, tell)
+            if settings.steady:
+                doubtful = [cell for cell in todo if (found := store.outcome(cell)) is not None and found.is_doubtful]
+                _run_here(plan, store, evolve(settings, jobs=1), preload, doubtful, tell)
+    finally:
+        _refuse_changed(plan, store, known)
+
+
+def _refuse_changed(plan: Plan, store: Store, known: Mapping[str, str]) -> None:
+    """Have the cells count as failed that are not as they were stored: a method has reached into the run folder.
+
+    Where methods find it read-only (`matbench.solving.confinement`), there are none.
+    """
+    changed = Outcome("failed", reason="its files were changed by a method after it was solved")
+    for cell in plan.cells:
+        if store.fingerprint(cell) != known[cell.key]:
+            with store.building(cell) as draft:
+                write_cell(draft, cell, changed)
+                (draft / "log.txt").touch()
 
 
 def _dataset_modules(cells: Iterable[Cell]) -> list[str]:

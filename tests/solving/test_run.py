@@ -1,0 +1,117 @@
+"""Computing the cells of a plan: what is done once more, and what methods may not change."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from places import METHODS
+
+from matbench import comparison
+from matbench.plans.settings import Settings
+from matbench.rescoring import open_run
+from matbench.runs.store import Outcome
+from matbench.runs.todo import explained
+from matbench.solving import confinement
+
+SCENE = "synthetic/box[size=48x36]"
+
+REACHES = '''
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from matbench import Estimate
+
+
+class Reaches:
+    """Makes the cells of others better, where it can."""
+
+    def solve(self, scene, context):
+        if scene.width > 64 or scene.height > 16:
+            for path in Path(os.environ["CELLS"]).glob("*/cell.json"):
+                facts = json.loads(path.read_text())
+                facts["outcome"]["seconds"] = 1e-6
+                try:
+                    path.write_text(json.dumps(facts))
+                    print("changed", path.parent.name)
+                except OSError as error:
+                    print("refused:", error.strerror)
+        return Estimate({scene.ref: np.zeros((scene.height, scene.width), np.float32)})
+'''
+
+
+def compared(tmp_path: Path, *options: str, **environment: str) -> comparison.Comparison:
+    """A run by the command line, in a process of its own whose keepers know this environment."""
+    (tmp_path / "reaches.py").write_text(REACHES)
+    plugins = ["--plugin", str(METHODS), "--plugin", str(tmp_path / "reaches.py")]
+    line = [
+        sys.executable,
+        "-m",
+        "matbench",
+        "compare",
+        *plugins,
+        "-s",
+        SCENE,
+        "--out",
+        str(tmp_path / "run"),
+        *options,
+    ]
+    variables = {**os.environ, "CELLS": str(tmp_path / "run" / "cells"), **environment}
+    subprocess.run(line, env=variables, capture_output=True, timeout=300, check=False)
+    ready, _ = open_run(tmp_path / "run")
+    return ready
+
+
+def outcome_of(ready: comparison.Comparison, name: str) -> Outcome:
+    (found,) = (ready.store.outcome(cell) for cell in ready.plan.cells if cell.method.algorithm == name)
+    assert found is not None
+    return found
+
+
+@pytest.mark.skipif(not confinement.is_possible(), reason="this system lets nobody mount in a namespace of their own")
+def test_a_method_can_not_change_what_was_solved(tmp_path: Path) -> None:
+    ready = compared(tmp_path, "-a", "flat", "reaches")
+    flat, reaches = outcome_of(ready, "flat"), outcome_of(ready, "reaches")
+    assert flat.status == reaches.status == "ok"
+    assert flat.seconds != 1e-6
+    assert flat.ran_on["run folder"] == "read-only for methods"
+    logs = [(ready.store.cell(cell) / "log.txt").read_text() for cell in ready.plan.cells]
+    assert any("refused: Read-only file system" in log for log in logs)
+
+
+def test_what_a_method_changed_is_found_out(tmp_path: Path) -> None:
+    ready = compared(tmp_path, "-a", "flat", "reaches", MATBENCH_UNCONFINED="1")
+    flat = outcome_of(ready, "flat")
+    assert flat.status == "failed"
+    assert "changed by a method" in flat.reason
+    assert outcome_of(ready, "reaches").status == "ok"
+
+
+def test_what_others_disturbed_is_solved_once_more(tmp_path: Path) -> None:
+    begun: list[str] = []
+    settings = Settings(jobs=2, steady=True)
+    ready = comparison.prepare(["flat", "noise"], SCENE, plugin=METHODS, out=tmp_path / "run", settings=settings)
+    ready.run(lambda event, cell, _: begun.append(str(cell)) if event == "start" else None)
+    # two at once are never alone: both are solved once more
+    assert sorted(begun) == sorted([str(cell) for cell in ready.plan.cells] * 2)
+    assert all(found is not None and found.alone for found in map(ready.store.outcome, ready.plan.cells))
+
+
+def test_a_doubtful_cell_is_due_again_only_if_asked_for(tmp_path: Path) -> None:
+    ready = comparison.prepare("flat", SCENE, plugin=METHODS, out=tmp_path / "run")
+    ready.run()
+    (cell,) = ready.plan.cells
+    path = ready.store.cell(cell) / "cell.json"
+    facts = json.loads(path.read_text())
+    facts["outcome"]["doubt"] = "others took 1 processor seconds of 1 s"
+    path.write_text(json.dumps(facts))
+    assert not ready.pending().cells
+    again = comparison.prepare("flat", SCENE, plugin=METHODS, out=tmp_path / "run", settings=Settings(steady=True))
+    assert again.pending().cells == (cell,)
+    ((_, why),) = explained(again.plan, again.store, again.settings)
+    assert why == "its seconds are in doubt: others took 1 processor seconds of 1 s"
