@@ -354,7 +354,7 @@ def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
         "print(len(table))\n"
     )
     said = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120, check=True).stdout
-    assert said.split() == ["once", str(9 * 15)]
+    assert said.split() == ["once", str(9 * 16)]
 
 
 def test_the_plan_on_disk_holds_no_code_and_reads_back(tmp_path: Path) -> None:

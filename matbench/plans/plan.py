@@ -85,7 +85,7 @@ class Plan:
     cells
         What is to be computed.
     plugin_files
-        The users' own files that hold methods.
+        The users' own files: methods, scenes and metrics.
     spellings
         Other names by which scenes were asked for -> what they are called in the cells.
     """
