@@ -90,7 +90,7 @@ def test_the_terminal_marks_and_explains() -> None:
 @pytest.mark.parametrize("format", paper.FORMATS)
 def test_a_paper_says_the_same(format: paper.Format) -> None:
     made = paper.sheet(*run(), "bad_1")
-    text = paper.write(made, format)
+    text = paper.formatted(made, format)
     means = made.texts[made.texts["scene"] == paper.MEAN].set_index("method")
     assert means["mean rank"].to_dict() == {"good": "1.00", "fair": "2.00", "silent": "–", "sparse": "–"}
     if format == "csv":
