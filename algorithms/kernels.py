@@ -20,7 +20,9 @@ INNER = OPTIONS | {"no_cpython_wrapper": True}
 kernel = njit(**OPTIONS)
 # one that only other loops call: without an entry from Python it compiles sooner
 helper = njit(**INNER)
-# the same for sums whose last bit matters: they are added up as written, and every product is rounded on its own
+# the same for one with many arguments, whose handing over takes time: it becomes part of the loop that calls it
+inlined = njit(**(INNER | {"forceinline": True}))
+# and for sums whose last bit matters: they are added up as written, and every product is rounded on its own
 literal = njit(**(INNER | {"fastmath": False}))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from matbench.algorithms.features import CENSUS_BITS, CENSUS_WORDS
-from matbench.algorithms.kernels import fill, helper, kernel, popcount
+from matbench.algorithms.kernels import fill, helper, inlined, kernel, popcount
 
 FULL = 255  # a stored similarity of 1: similarities are kept in one byte
 COLOUR, SLOPE, ORDER = 0.35, 0.25, 0.40  # weights of the three costs of ``mixed``
@@ -91,19 +91,21 @@ def _count_differing(left, right, fi, ui, fj, uj, row, differing):  # type: igno
         i, j = x + np.uintp(ui), x + np.uintp(uj)
         count = np.uint16(0)
         for word in range(CENSUS_WORDS):
-            count = np.uint16(count + popcount(np.uint16(left.bits[fi, word, row, i] ^ right.bits[fj, word, row, j])))
+            count = np.uint16(count + popcount(np.uint16(left[fi, word, row, i] ^ right[fj, word, row, j])))
         differing[x] = count
 
 
-@helper
-def _count_differing_among(left, right, fi, ui, fj, uj, row, differing, compared):  # type: ignore[no-untyped-def]
+@inlined
+def _count_differing_among(  # type: ignore[no-untyped-def]
+    left, right, left_masks, right_masks, fi, ui, fj, uj, row, differing, compared
+):
     """How many bits differ among those that are set in the masks of both views, and how many these are."""
     for x in range(np.uintp(differing.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
         differ, among = np.uint16(0), np.uint16(0)
         for word in range(CENSUS_WORDS):
-            both = np.uint16(left.masks[fi, word, row, i] & right.masks[fj, word, row, j])
-            unlike = np.uint16((left.bits[fi, word, row, i] ^ right.bits[fj, word, row, j]) & both)
+            both = np.uint16(left_masks[fi, word, row, i] & right_masks[fj, word, row, j])
+            unlike = np.uint16((left[fi, word, row, i] ^ right[fj, word, row, j]) & both)
             differ, among = np.uint16(differ + popcount(unlike)), np.uint16(among + popcount(both))
         differing[x], compared[x] = differ, among
 
@@ -119,9 +121,9 @@ def _census_difference(differing, compared, masked, out):  # type: ignore[no-unt
         out[x] = share * min(differ, most)
 
 
-@helper
+@inlined
 def _mixed_difference(  # type: ignore[no-untyped-def]
-    left, right, fi, ui, fj, uj, row, differing, compared, masked, channels, limit, out
+    left, right, left_slope, right_slope, differing, compared, fi, ui, fj, uj, row, masked, channels, limit, out
 ):
     """out = the cost of ``mixed`` at every pixel, between 0 and 1 unless `limit` allows more."""
     colour, slope = np.float32(COLOUR / COLOUR_SPAN / len(channels)), np.float32(SLOPE / SLOPE_SPAN)
@@ -131,8 +133,8 @@ def _mixed_difference(  # type: ignore[no-untyped-def]
         i, j = x + np.uintp(ui), x + np.uintp(uj)
         total = zero
         for c in range(len(channels)):
-            total += abs(left.rows[fi, c, row, i] - right.rows[fj, c, row, j])
-        steep = abs(left.slopes[fi, row, i] - right.slopes[fj, row, j])
+            total += abs(left[fi, c, row, i] - right[fj, c, row, j])
+        steep = abs(left_slope[fi, row, i] - right_slope[fj, row, j])
         differ = np.float32(differing[x])
         if len(masked) > 0:
             differ = bits * differ / np.float32(compared[x])
@@ -247,15 +249,19 @@ def pair_rows(left, right, criterion, spans, fineness, y0, p, out):  # type: ign
                 else:
                     differ, among = differing[:width], compared[:width]
                     if len(masked) > 0:
-                        _count_differing_among(left, right, fi, ui, fj, uj, row, differ, among)
+                        _count_differing_among(
+                            left.bits, right.bits, left.masks, right.masks, fi, ui, fj, uj, row, differ, among
+                        )
                     else:
-                        _count_differing(left, right, fi, ui, fj, uj, row, differ)
+                        _count_differing(left.bits, right.bits, fi, ui, fj, uj, row, differ)
                     if measure == CENSUS:
                         _census_difference(differ, among, masked, cost)
                     else:
+                        # no whole tuples: with more arrays the compiler gives up checking that they do not overlap
                         _mixed_difference(
-                            left, right, fi, ui, fj, uj, row, differ, among, masked, channels, limit, cost
-                        )
+                            left.rows, right.rows, left.slopes, right.slopes, differ, among, fi, ui, fj, uj, row,
+                            masked, channels, limit, cost,
+                        )  # fmt: skip
                 if y < y0:
                     continue
                 _sum_rows(near, taps, column[reach : reach + width])

@@ -18,11 +18,11 @@ def views_and_reference(
 ) -> tuple[list[int], int]:
     """Indices of the views that the options `views` and `baseline` ask for, and of the reference view.
 
-    ``views=5`` is that many views, evenly spaced, as wide as they fit; ``baseline=4`` all views
-    within four view steps; both together, that many views of which the last is that far from the
-    first. Then the reference view is that of the whole scene whatever the numbers are, so that
-    they can be swept; it need not lie in the middle. Other values of `views` are labels, as in
-    `view_indices`.
+    ``views=5`` asks for that many views, evenly spaced, as wide as they fit. ``baseline=4`` asks for all views
+    within four view steps. Both together ask for that many views of which the last is that far from the
+    first. In these cases the reference view is that of the whole scene, whatever the numbers are, so that a
+    sweep over them scores the same view; it need not lie in the middle. Other values of `views` are
+    labels, as in `view_indices`.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Light fields of the HCI 4D benchmark: any row or column of their 9x9 views is a scene.
 
-Below the data root lie ``hci/CATEGORY/SCENE/input_Cam000.png`` to ``input_Cam080.png``, row by row
-from the top left, ``gt_disp_lowres.pfm`` for the centre view, maybe ``gt_disp_lowres_Cam000.pfm``
-and so on for all, and ``parameters.cfg``. Disparities are signed; the benchmark's thresholds are in
-pixels between neighbouring views, so its pair are two neighbours.
+In ``hci/CATEGORY/SCENE`` below the data root lie the views ``input_Cam000.png`` to ``input_Cam080.png``, row by
+row from the upper left one; ``gt_disp_lowres.pfm``, the truth of the centre view; for some scenes
+``gt_disp_lowres_Cam000.pfm`` and so on, that of all views; and ``parameters.cfg``. Disparities have a sign. The
+benchmark's thresholds are in pixels between neighbouring views, so two neighbours are its pair.
 
 Reference: Honauer, Johannsen, Kondermann & Goldluecke, ACCV 2016.
 """
@@ -23,8 +23,8 @@ from matbench.scenes.dataset import Listing
 SIDE, SIZE = 9, (512, 512)
 
 RANGE = Range(-4, 4)
-"""Px per view step: what is searched where there is no ``parameters.cfg``. It is the same for every
-scene and a little more than any of the benchmark has."""
+"""Px per view step: what is searched where there is no ``parameters.cfg``. It holds the truth of every scene of
+the benchmark, with a little to spare."""
 
 SCENES = {
     "additional": (

@@ -1,8 +1,8 @@
 """The Middlebury scenes of 2001, 2003, 2005 and 2006, as their site lays them out.
 
-Below the data root lie ``middlebury/scenes2001/data/SCENE``, ``scenes2003/newdata/SCENE`` and
-``newdata/half/SCENE``, ``scenes2005/ThirdSize/SCENE`` and so on. Truth is stored as grey levels, a
-whole number of them for each pixel of disparity between the two views of the field's pair.
+Below the data root lie ``middlebury/scenes2001/data/SCENE``, ``middlebury/scenes2003/newdata/SCENE`` and
+``middlebury/scenes2003/newdata/half/SCENE``, ``middlebury/scenes2005/ThirdSize/SCENE`` and so on. Truth is stored as
+grey levels: so many, a whole number, for each pixel of disparity between the two views of the field's pair.
 
 References: Scharstein & Szeliski, IJCV 2002 (2001); Scharstein & Szeliski, CVPR 2003 (2003);
 Scharstein & Pal, CVPR 2007, and Hirschmueller & Scharstein, CVPR 2007 (2005, 2006).
@@ -27,9 +27,9 @@ _PREFIXES = ("im", "view")
 
 @frozen
 class Middlebury:
-    """One year's scenes: those of the registry, and those that only the data root knows.
+    """One year's scenes: those of the registry, and those that only the data root has.
 
-    Where no size is named, it is the first of the layouts' that a scene's folders have.
+    Where no size is asked for, it is the first of the year's layouts in which the scene is present.
     """
 
     year: str
@@ -39,7 +39,7 @@ class Middlebury:
         return registry(self.year)
 
     def listings(self, root: Path | None) -> Sequence[Listing]:
-        """All scenes of the year, with those that only the data root knows."""
+        """All scenes of the year, with those that only the data root has."""
         names = sorted({*self.known.scenes, *self._names_present(root)}, key=lambda name: (name.lower(), name))
         return [self._listing(name, root) for name in names]
 
@@ -61,7 +61,7 @@ class Middlebury:
         )
 
     def _is_complete(self, root: Path, name: str, size: str) -> bool:
-        """Can it be loaded, with all views, and scored if it is known to have truth?"""
+        """Are all views present, and some truth unless none was published?"""
         folder, layout = self._folder(root, name, size), self._layout(name, size)
         return all(image_file(folder, layout.view.format(k)).is_file() for k in layout.numbers) and (
             self._lacks_truth(name, size)
@@ -103,9 +103,17 @@ class Middlebury:
         )
 
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:
-        """Load a scene; options are `size`, `views`, `baseline`, `ref` and `disparities`.
+        """Load a scene: its chosen views and their truth.
 
-        Only the chosen views are read, and their truth.
+        Parameters
+        ----------
+        options
+            `size`, and those of `stored.OPTIONS`.
+
+        Raises
+        ------
+        UserError
+            If the scene or an option does not exist, or a file is missing or damaged.
         """
         called = f"middlebury{self.year}/{name}"
         check_options(called, options, ("size",))
@@ -138,7 +146,7 @@ class Middlebury:
             If the scene or size does not exist, or is not there.
         """
         known, present = self.known.scenes, self._names_present(root)
-        # nothing else is ever joined to a path
+        # the name comes from the command line: only one that is known is ever joined to a path
         if name not in known and name not in present:
             raise unknown(f"scene of middlebury{self.year}", name, {*known, *present})
         here = self._sizes_present(name, root)

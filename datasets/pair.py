@@ -1,8 +1,8 @@
 """A pair of views as Middlebury lays it out since 2014: ``im0.png im1.png calib.txt disp0.pfm``.
 
-``calib.txt`` has lines such as ``ndisp=280``. That number bounds the disparities without leaking
-the truth, and is what is searched: 0 .. ndisp - 1. `vmin` and `vmax` are the truth's own ends, for
-colours only, and are not used. Truth is infinite where unknown.
+``calib.txt`` has lines such as ``ndisp=280``. That number bounds the disparities loosely, without giving the
+truth away, so 0 .. ndisp - 1 is searched. `vmin` and `vmax` are the ends of the truth itself, meant for
+choosing colours, and are not used. Truth is infinite where it is unknown.
 
 Reference: Scharstein et al., GCPR 2014; https://vision.middlebury.edu/stereo/data/scenes2014/
 """

@@ -1,4 +1,4 @@
-"""Scenes kept as files: which images are its views, and what its truth files mean."""
+"""Scenes kept as files: which images are their views, and what their truth files mean."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -110,7 +110,7 @@ class TruthFile:
 
 @frozen
 class StoredScene:
-    """Where the views of a scene lie and what is known about them.
+    """Where the files of a scene lie and what is known about them. All real scenes are loaded through it.
 
     Parameters
     ----------
@@ -126,15 +126,15 @@ class StoredScene:
     pair_steps
         View steps between the two views of the pair.
     size
-        (width, height), where that is known beforehand.
+        (width, height) in pixels that the images must have; None if it is not known beforehand.
     preferred
         Indices of the views to score rather than others, the best first. The others follow from the middle
         outwards, those with truth if any has.
     prefixes
         What may stand before a view's number where an option names it, as in ``views=im2+im6``.
     column
-        The views were taken one below the other: all is turned by a quarter, counter-clockwise,
-        so that they lie from left to right.
+        The views were taken one below the other, from the top. Images and truth are turned counter-clockwise
+        by a quarter, so that the views lie from left to right.
     """
 
     called: str
@@ -204,7 +204,7 @@ class StoredScene:
         return Range(0, max(1, ceil(nearest / ROUND_UP - 1e-6)) * ROUND_UP / self.pair_steps)
 
     def _partner(self, ref: int) -> int:
-        """View steps from the reference view to the other one of the pair."""
+        """View steps from the reference view to the other one of the pair: to the right if there is one, else left."""
         for steps in (self.pair_steps, -self.pair_steps):
             if 0 <= ref + steps < len(self.views):
                 return steps
@@ -214,7 +214,10 @@ class StoredScene:
         )
 
     def problems(self) -> list[str]:
-        """Everything that is wrong with the files, one line each; the size that most views have is right."""
+        """Everything that is wrong with the files, one line each.
+
+        Where the size is not known beforehand, the one that most views have is taken to be right.
+        """
         found, sizes = [], {}
         for path in self.views:
             try:

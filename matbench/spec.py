@@ -282,9 +282,13 @@ def refuse_silent(name: str, instance: object, options: Mapping[str, Any]) -> No
     Raises
     ------
     UserError
-        If one of them is a parameter that changes nothing beside the values of the others.
+        If one of them is a parameter that changes nothing beside the values of the others, or the method's
+        `silent` fails.
     """
-    silent = silent_in(instance)
+    try:
+        silent = silent_in(instance)
+    except Exception as error:  # whatever a method's own code raises
+        raise UserError(f"{name}: its silent parameters cannot be told: {one_line(error)}") from error
     for key, value in options.items():
         if key in silent:
             raise UserError(f"{name}: {_changes_nothing(key, value, silent)}")

@@ -35,7 +35,8 @@ LINES = list(
 
 METHOD = blocks("python", "README.md")[0]
 SCENE = blocks("toml", "docs/guides/own-scene.md")[0]
-SCRIPT = blocks("python", "docs/guides/own-method.md")[1]
+GROUPS = blocks("python", "docs/guides/own-method.md")[1]
+SCRIPT = blocks("python", "docs/guides/own-method.md")[-1]
 OWN_FILES = dict(re.findall(r"`(\w+\.py)`:\n\n```python\n(.*?)```", TEXT["docs/guides/extending.md"], re.DOTALL))
 """The files that the page on extending has one write: name -> content."""
 CI_SCRIPT = blocks("python", "docs/guides/ci.md")[0]

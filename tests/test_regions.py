@@ -7,7 +7,7 @@ import pytest
 
 from matbench.datasets.middlebury import MIDDLEBURY_2001, MIDDLEBURY_2003
 from matbench.datasets.synthetic import SYNTHETIC, WORLDS
-from matbench.files.images import read_grey
+from matbench.files.images import read_levels
 from matbench.regions import VIEW_REGIONS, counts, near_jumps, points_seen, regions, textureless, view_regions
 from matbench.scene import Scene
 
@@ -29,7 +29,7 @@ def _overlap(a: np.ndarray, b: np.ndarray) -> float:
 def test_overlap_with_published_masks(data_root: Path, dataset, scene: str, occluded: float, jumps: float) -> None:
     """Intersection over union, for the occluded part inside `all` and for `disc`."""
     folder = data_root / "middlebury" / "eval_v2" / scene
-    nonocc, everything, disc = (read_grey(folder / f"{name}.png") == 255 for name in ("nonocc", "all", "disc"))
+    nonocc, everything, disc = (read_levels(folder / f"{name}.png") == 255 for name in ("nonocc", "all", "disc"))
     found = dataset.load(scene, {}, data_root).regions
     assert _overlap(found["occ"] & everything, everything & ~nonocc) > occluded
     assert _overlap(found["disc"] & everything, disc) > jumps

@@ -291,3 +291,14 @@ def test_a_silent_that_means_something_else_is_let_be() -> None:
         silent: bool = True
 
     refuse_silent("quiet", Quiet(), {"silent": "true"})
+
+
+def test_a_silent_that_fails_is_one_line() -> None:
+    class Fails:
+        @property
+        def silent(self) -> dict[str, str]:
+            raise ValueError("no window\nand more")
+
+    with pytest.raises(UserError, match="fails: its silent parameters cannot be told: no window") as error:
+        refuse_silent("fails", Fails(), {})
+    assert "\n" not in str(error.value)

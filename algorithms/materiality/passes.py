@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from matbench.algorithms.kernels import fill, helper, kernel
+from matbench.algorithms.kernels import fill, helper, inlined, kernel
 from matbench.algorithms.materiality.energy import Rays, chain, descend, mark_layers, match, see_layer, shade, tie
 from matbench.space import DisparitySpace
 
@@ -202,7 +202,7 @@ def _match_pairs(mu, seen, rho, k, pairs, slide, origin, samples, full, pulls): 
     return energy
 
 
-@helper
+@inlined
 def _pass_plane(  # type: ignore[no-untyped-def]
     y, k, above, here, below, rays, data, any_views, links, rest, weights, ties, room, step, offset, new, slopes, sums
 ):

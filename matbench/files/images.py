@@ -50,20 +50,6 @@ def read_rgb(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint
     return image
 
 
-def read_grey(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """Read a grey image, such as ground truth: as `read_rgb`, but (H, W) uint8.
-
-    Raises
-    ------
-    UserError
-        As `read_rgb`, and if the image is coloured.
-    """
-    image = read_rgb(path, size)
-    if (image != image[..., :1]).any():
-        raise UserError(f"image {path} is coloured: ground truth is one grey level a pixel")
-    return np.ascontiguousarray(image[..., 0])
-
-
 def read_levels(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint16]:
     """Read the levels of a grey image of 8 or 16 bits, as they are stored.
 
@@ -74,8 +60,8 @@ def read_levels(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.u
     Raises
     ------
     UserError
-        As `read_grey`, and if there are fewer than 8 bits a pixel: the decoder would stretch them to 256
-        levels, so that the stored levels are lost.
+        As `read_rgb`, if the image is coloured, and if there are fewer than 8 bits a pixel: the decoder would
+        stretch them to 256 levels, so that the stored levels are lost.
     """
     image = _read_image(path, size, 16)
     if (image != image[..., :1]).any():

@@ -5,9 +5,11 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import pytest
 import rerun as rr
-from shown import CI_SCRIPT, LINES, METHOD, SCRIPT, TEXT
+from shown import CI_SCRIPT, GROUPS, LINES, METHOD, SCRIPT, TEXT
 
 from matbench import load_scene
 
@@ -24,6 +26,15 @@ def test_the_method_of_ten_lines_competes(tmp_path: Path) -> None:
     done = matbench(line.replace("synthetic/*", "synthetic/box[size=96x72]"), tmp_path)
     assert done.returncode == 0, done.stderr
     assert "mine[share=0.2]" in done.stdout
+
+
+def test_the_guides_groups_do_what_it_says() -> None:
+    names: dict[str, Any] = {}
+    exec(GROUPS, names)  # noqa: S102 (what the guide shows)
+    assert names["Mine"](share=0.2) == names["Mine"](guess=names["Guess"](0.2))
+    with pytest.raises(ValueError, match="changes nothing") as error:
+        names["Mine"](quick=True, share=0.2)
+    assert f"`{error.value}`" in TEXT["docs/guides/own-method.md"]
 
 
 def test_the_scripts_run(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scene_files import check_one_line
 
 from matbench.errors import UserError
-from matbench.files.images import encoding, read_grey, read_levels, read_rgb, read_size
+from matbench.files.images import encoding, read_levels, read_rgb, read_size
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (7, 11, 3), np.uint8)
 
@@ -54,9 +54,9 @@ def test_colour_and_grey_come_back(tmp_path: Path, encode) -> None:
     np.testing.assert_array_equal(read_rgb(path, (11, 7)), PICTURE)
     assert read_size(path) == (11, 7)
     with pytest.raises(UserError, match="is coloured"):
-        read_grey(path)
+        read_levels(path)
     path.write_bytes(encode(PICTURE[..., 0]))
-    np.testing.assert_array_equal(read_grey(path), PICTURE[..., 0])
+    np.testing.assert_array_equal(read_levels(path), PICTURE[..., 0])
 
 
 @pytest.mark.parametrize("encode", [_png, _pnm])

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from matbench import load_scene
-from matbench.files.images import read_grey
+from matbench.files.images import read_levels
 from matbench.measures.metrics import METRICS, MapInRegion, Metric, error_map, score
 
 NAMES = [
@@ -52,9 +52,9 @@ def test_patchmatch_scores_as_published(data_root: Path, scene: str, grey: int, 
     """Bleyer et al. 2011, bad pixels at 1 px in per cent: nonocc, all, disc."""
     folder = data_root / "middlebury" / "eval_v2" / scene
     estimate, truth = (
-        read_grey(folder / f"{name}.png").astype(np.float32) / grey for name in ("alg117", "groundtruth")
+        read_levels(folder / f"{name}.png").astype(np.float32) / grey for name in ("alg117", "groundtruth")
     )
-    masks = [read_grey(folder / f"{name}.png") == 255 for name in ("nonocc", "all", "disc")]
+    masks = [read_levels(folder / f"{name}.png") == 255 for name in ("nonocc", "all", "disc")]
     found = [score(estimate, truth, mask, 1)["bad_1"] for mask in masks]
     assert [f"{value:.2f}" for value in found] == [f"{value:.2f}" for value in published]
 
