@@ -198,9 +198,11 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
             _check_scene(solved, scene)
             rows += _scored(solved, scene)
             curves += _curve(solved, scene)
+    cells = pd.DataFrame(lines, columns=list(CELL_COLUMNS))
+    nowhere = [name for name in _NUMBERS if cells[name].isna().all()]  # numbers nobody has are numbers all the same
     return Tables(
         pd.DataFrame(rows, columns=list(RESULT_COLUMNS)),
-        pd.DataFrame(lines, columns=list(CELL_COLUMNS)),
+        cells.astype(dict.fromkeys(nowhere, float)),
         pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(columns=list(RELIABILITY_COLUMNS)),
         tuple(unsteady),
         outcomes,

@@ -213,7 +213,7 @@ def test_a_map_that_changes_after_it_was_scored_is_not_drawn(tmp_path: Path) -> 
         path.touch()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("matbench.reports.page.write", look)
+        patch.setattr("matbench.reports.page.write_page", look)
         ready.report(made)
     assert drawn[0] is None
     assert drawn[1] is not None
