@@ -230,7 +230,8 @@ class Comparison:
     def _asked(self, is_ablation: bool) -> list[object]:
         """What decides the page besides the tables and what they are made from."""
         rows = self.settings.record.rows if self.settings.record is not None else ()
-        return [self.command, self.folder.resolve().name, list(rows), is_ablation, dict(self.plan.spellings)]
+        name, spellings = self.folder.resolve().name, dict(self.plan.spellings)
+        return [self.command, name, list(rows), is_ablation, spellings, list(self.remarks)]
 
     def _facts(self, found: Tables) -> dict[str, str]:
         """What the cells ran on, each on its own: a run may go on elsewhere."""
