@@ -7,8 +7,8 @@ from attrs import field, frozen
 from matbench.algorithm import Context, Estimate
 from matbench.algorithms.inference import Inference
 from matbench.algorithms.similarity import Matcher, Matching
+from matbench.parameters import flat
 from matbench.scene import Scene
-from matbench.spec import flat
 
 
 @flat

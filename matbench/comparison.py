@@ -1,9 +1,7 @@
 """A whole comparison: choose methods and scenes, run, score, report. Where the parts are put together."""
 
-import operator
 import shlex
 import sys
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,23 +11,24 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from matbench import spec
-from matbench.errors import UserError, unknown
+from matbench.errors import UserError
 from matbench.files.writing import write_text
 from matbench.measures.prediction import instead_of_truth
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan, make_plan, methods
 from matbench.plans.record_option import MOST_ROWS, RecordOption
+from matbench.plans.request import seeds_of
 from matbench.plans.settings import Settings
 from matbench.results import freshness, scores
 from matbench.results.scores import Tables
 from matbench.runs import provenance
 from matbench.runs.lock import locked
-from matbench.runs.store import FolderLost, Outcome, Store
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import FolderLost, Store
 from matbench.runs.todo import Todo, pending
 from matbench.scene import NotInScene, Scene
-from matbench.scenes.catalogue import PAPER_SCENES, Selection, data_root, is_pattern, listings, load_scene, select
-from matbench.scenes.dataset import Listing
+from matbench.scenes.catalogue import Selection, data_root, default_scenes, is_pattern, load_scene, select
 from matbench.scenes.scene_check import beyond_range
 from matbench.solving import run
 
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
 
     from matbench.results.sweeps import Sweep
 
-SYNTHETIC_SCENES = ("synthetic/box", "synthetic/curved", "synthetic/weak")
 RUNS = Path("runs")
 
 
@@ -213,7 +211,7 @@ class Comparison:
                 volumes=volume,
                 histories={key: outcome.history for key, outcome in outcomes.items() if outcome is not None},
                 parameters={(c.method.algorithm, c.method.changed): c.method.params for c in self.plan.cells},
-                groups={c.method.algorithm: _groups(c.method.algorithm) for c in self.plan.cells},
+                groups={c.method.algorithm: plugins.groups(c.method.algorithm) for c in self.plan.cells},
                 rows=self._rows(tables.outcomes.values()),
             ),
         )
@@ -248,66 +246,6 @@ class Comparison:
         if self.remarks:
             facts["ranges"] = "; ".join(self.remarks)
         return facts
-
-
-def _groups(algorithm: str) -> dict[str, str]:
-    """Parameter -> group of an installed method; of another none: what a run folder names is not executed."""
-    plugin = plugins.installed("algorithms").get(algorithm)
-    try:
-        known = {} if plugin is None else spec.parameters(plugin.load())
-    except UserError:
-        return {}
-    return {name: one.group for name, one in known.items() if one.group}
-
-
-def default_algorithms() -> list[str]:
-    """All built-in methods that need not be told anything."""
-    built_in = [p for p in plugins.installed("algorithms").values() if p.source == "matbench-stereo"]
-    return [p.name for p in built_in if not spec.required(p.load())]
-
-
-def default_scenes(data: str | Path | None = None) -> tuple[list[str], list[str]]:
-    """Three synthetic scenes and the paper's three: those that are present, and those missing."""
-    known = listings(data)
-    present = {name for name, listing in known.items() if isinstance(listing, Listing) and listing.present}
-    synthetic = [name for name in SYNTHETIC_SCENES if name in present]
-    paper = [name for name in PAPER_SCENES if name in present]
-    return synthetic + paper, [name for name in PAPER_SCENES if name not in present]
-
-
-def read_request(path: Path) -> tuple[list[str], list[str] | None]:
-    """Selectors of algorithms and scenes from a TOML file; None where it names no scenes.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, is no TOML, or holds something else than the two lists.
-    """
-    try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise UserError(f"{path} is not TOML: {error}") from error
-    for key, value in found.items():
-        if key not in ("algorithms", "scenes"):
-            raise unknown(f"key in {path}", key, ("algorithms", "scenes"))
-        if not (isinstance(value, list) and value and all(isinstance(one, str) for one in value)):
-            raise UserError(f"{path}: {key} is {value!r}, not a list of texts such as {key} = ['...']")
-    if "algorithms" not in found:
-        raise UserError(f"{path} names no algorithms: write algorithms = ['materiality[pairs=all,consecutive]']")
-    return found["algorithms"], found.get("scenes")
-
-
-def _seeds(seed: object) -> list[int]:
-    given = list(seed) if isinstance(seed, list | tuple | range) else [seed]
-    try:
-        found = [operator.index(one) for one in given if not isinstance(one, bool)]  # type: ignore[arg-type]
-    except TypeError:
-        found = []
-    if len(found) != len(given) or not found or min(found) < 0:
-        raise UserError(f"seed {seed!r} is not one or several whole numbers from 0")
-    return list(dict.fromkeys(found))
 
 
 def prepare(
@@ -346,9 +284,9 @@ def _prepare(
     if not 1 <= repeats <= 100:
         raise UserError(f"repeats {repeats} is not a whole number from 1 to 100")
     rows = settings.record.rows if settings.record is not None else ()
-    seeds = _seeds(seed)
+    seeds = seeds_of(seed)
     own = [p.name for file in files for p in plugins.from_file(file).values()]
-    chosen = methods(algorithms if algorithms is not None else [*default_algorithms(), *own], files)
+    chosen = methods(algorithms if algorithms is not None else [*plugins.default_algorithms(), *own], files)
     root = data_root(settings.data)
     selected = select(scenes, root) if scenes is not None else Selection(tuple(default_scenes(root)[0]))
     if not chosen or not selected.names:

@@ -14,7 +14,8 @@ from matbench.plans import plugins
 from matbench.plans.plan import Cell, Method, Plan
 from matbench.plans.settings import Settings
 from matbench.results import archive, scores
-from matbench.runs.store import Outcome, Store
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import Store
 from matbench.scene import Scene
 from matbench.scenes.catalogue import data_root, load_scene
 

@@ -19,6 +19,7 @@ import matbench
 from matbench import comparison
 from matbench.errors import UserError
 from matbench.plans.plan import methods
+from matbench.plans.request import read_request
 from matbench.plans.settings import Settings
 from matbench.regions import REGIONS
 from matbench.results.scores import RESULT_COLUMNS
@@ -492,7 +493,7 @@ def test_an_ablation_from_the_command_line(tmp_path: Path) -> None:
 def test_a_malformed_request_is_refused(tmp_path: Path, content: str, said: str) -> None:
     (tmp_path / "request.toml").write_text(content)
     with pytest.raises(UserError, match=r"request\.toml") as error:
-        comparison.read_request(tmp_path / "request.toml")
+        read_request(tmp_path / "request.toml")
     assert said in str(error.value)
 
 

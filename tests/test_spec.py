@@ -9,20 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from matbench.errors import UserError
-from matbench.spec import (
-    Parameter,
-    Spec,
-    build,
-    changed,
-    expand,
-    flat,
-    parameters,
-    parse,
-    refuse_silent,
-    required,
-    text,
-    values_of,
-)
+from matbench.parameters import Parameter, build, changed, flat, parameters, refuse_silent, required, values_of
+from matbench.spec import Spec, expand, parse, text
 
 
 @frozen

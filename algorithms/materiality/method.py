@@ -18,9 +18,9 @@ from matbench.algorithms.materiality.objective import Energy
 from matbench.algorithms.materiality.parameters import EnergyTerms, Solver, silent
 from matbench.algorithms.materiality.start import start
 from matbench.algorithms.similarity import FULL, Matcher, Matching
+from matbench.parameters import flat
 from matbench.scene import Scene
 from matbench.space import Volume
-from matbench.spec import flat
 
 
 @flat

@@ -42,12 +42,13 @@ def ablate(
     from matbench import comparison
     from matbench.commands import running
     from matbench.plans.plan import methods
+    from matbench.plans.request import read_request
     from matbench.results import ablation
 
     check_metric(options.metric, options.plugin)
     algorithms: list[str] = [selector]
     if selector.endswith(".toml"):
-        algorithms, listed = comparison.read_request(Path(selector))
+        algorithms, listed = read_request(Path(selector))
         scene = scene or listed
     chosen = methods(algorithms, options.plugin)
     ablation.check_varies(chosen, scene or ())

@@ -85,12 +85,13 @@ def compare(
     """
     from matbench import comparison
     from matbench.commands import running
+    from matbench.scenes.catalogue import default_scenes
 
     check_metric(options.metric, options.plugin)
     if row is not None and record is None:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
     if scene is None:
-        running.say_missing(comparison.default_scenes(options.data)[1], options)
+        running.say_missing(default_scenes(options.data)[1], options)
     ready = comparison.prepare(
         algorithm,
         scene,

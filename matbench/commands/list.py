@@ -12,7 +12,7 @@ from cyclopts import App, Parameter
 from rich.markup import escape
 from rich.table import Column, Table
 
-from matbench import spec
+from matbench import parameters
 from matbench.commands.console import DONE, Console
 from matbench.commands.options import Data, Plugins
 from matbench.errors import UserError
@@ -80,20 +80,20 @@ def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
         cls = plugin.load()
         if not isinstance(cls, type):
             raise UserError(f"plug-in {plugin.name!r} from {plugin.source} is no class")
-        parameters = spec.parameters(cls)
+        known = parameters.parameters(cls)
     except UserError as error:
         return facts | {"error": str(error)}
     empty = inspect.Parameter.empty
     return facts | {
         "about": (inspect.getdoc(cls) or "").split("\n\n")[0].replace("\n", " "),
-        "presets": sorted(spec.presets_of(cls)),
+        "presets": sorted(parameters.presets_of(cls)),
         "parameters": {
             name: {
-                "type": spec.describe(one.kind),
+                "type": parameters.describe(one.kind),
                 "default": None if one.default is empty else _plain(one.default),
             }
             | ({"group": one.group} if one.group else {})
-            for name, one in parameters.items()
+            for name, one in known.items()
         },
         "reads": _reads(plugin.name, cls),
     }
@@ -103,7 +103,7 @@ def _reads(name: str, cls: type) -> list[str]:
     """The files that a method with its defaults says it reads; none where something must be given, or is wrong."""
     if hasattr(cls, "reads") or hasattr(cls, "code_files"):  # else it need not be made
         with suppress(UserError):
-            return [str(path) for path in plugins.declared(name, spec.build(name, cls, {}))]
+            return [str(path) for path in plugins.declared(name, parameters.build(name, cls, {}))]
     return []
 
 

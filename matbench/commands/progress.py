@@ -13,7 +13,7 @@ from rich.text import Text
 
 from matbench.commands.console import Console
 from matbench.plans.plan import Cell
-from matbench.runs.store import FINAL, Outcome
+from matbench.runs.outcome import FINAL, Outcome
 
 SHOWN = 8  # running cells that are named; of the others the number is shown
 _BAR = 24

@@ -25,7 +25,8 @@ from matbench.results import scores
 from matbench.results.freshness import PAGE
 from matbench.results.scores import Tables
 from matbench.runs.lock import locked
-from matbench.runs.store import FINAL, FolderLost
+from matbench.runs.outcome import FINAL
+from matbench.runs.store import FolderLost
 from matbench.runs.todo import Todo, explained
 from matbench.scenes.catalogue import DATA_VARIABLE, data_root
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from attrs import field, frozen
 
-from matbench import spec
+from matbench import parameters, spec
 from matbench.errors import UserError
 from matbench.plans import plugins
 from matbench.scene import Scene
@@ -139,10 +139,10 @@ def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[
         instance = plugin.make(one.options)
         if not callable(getattr(instance, "solve", None)):
             raise UserError(f"{plugin.name} from {plugin.source} is no method: it has no solve(scene, context)")
-        spec.refuse_silent(plugin.name, instance, one.options)
-        preset = one.options.get("preset") if "preset" not in spec.parameters(type(instance)) else None
-        changed = spec.text(spec.changed(instance, preset))
-        params = spec.values_of(instance)
+        parameters.refuse_silent(plugin.name, instance, one.options)
+        preset = one.options.get("preset") if "preset" not in parameters.parameters(type(instance)) else None
+        changed = spec.text(parameters.changed(instance, preset))
+        params = parameters.values_of(instance)
         method = Method(plugin.name, params, changed, plugins.method_digest(plugin, instance))
         found.setdefault(spec.label(plugin.name, params), method)  # spelled in two ways, it is one method
     return list(found.values())

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from attrs import frozen
 
-from matbench import code, spec
+from matbench import code, parameters
 from matbench.code import Code
 from matbench.errors import UserError, failure, unknown
 from matbench.plans import kernels
@@ -67,7 +67,7 @@ class Plugin:
         UserError
             If its module fails to import, or for a parameter or a value that it does not take.
         """
-        return spec.build(self.name, self.load(), params)
+        return parameters.build(self.name, self.load(), params)
 
 
 @cache
@@ -274,7 +274,7 @@ def method_digest(plugin: Plugin, instance: object) -> str:
     UserError
         If one of them cannot be read.
     """
-    files = {f"{key}={path}": path for key, path in spec.paths_of(instance).items()}
+    files = {f"{key}={path}": path for key, path in parameters.paths_of(instance).items()}
     files |= {str(path): path for path in declared(plugin.name, instance)}
     if not files:
         return code_digest(plugin)
@@ -296,3 +296,19 @@ def kernel_cache() -> Path:
     every = [code_of(plugin) for _, plugin in sorted(installed("algorithms").items())]
     digests = [one.digest for one in every if "numba" in one.parts]
     return kernels.home() / sha256(" ".join(digests).encode()).hexdigest()[:16]
+
+
+def default_algorithms() -> list[str]:
+    """All built-in methods that need not be told anything."""
+    built_in = [p for p in installed("algorithms").values() if p.source == "matbench-stereo"]
+    return [p.name for p in built_in if not parameters.required(p.load())]
+
+
+def groups(algorithm: str) -> dict[str, str]:
+    """Parameter -> group of an installed method; of another none: what a run folder names is not executed."""
+    plugin = installed("algorithms").get(algorithm)
+    try:
+        known = {} if plugin is None else parameters.parameters(plugin.load())
+    except UserError:
+        return {}
+    return {name: one.group for name, one in known.items() if one.group}

@@ -16,7 +16,8 @@ from matbench.files.writing import write_text
 from matbench.plans import plan as plans
 from matbench.plans import plugins
 from matbench.plans.plan import Plan
-from matbench.runs.store import Outcome, Store
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import Store
 from matbench.scene import Scene
 
 FILE = "scores.json"

@@ -7,7 +7,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench.plans.plan import Cell
-from matbench.runs.store import FINAL, Outcome, Solved
+from matbench.runs.outcome import FINAL, Outcome
+from matbench.runs.store import Solved
 
 
 @frozen

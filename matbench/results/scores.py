@@ -19,7 +19,8 @@ from matbench.measures.volumes import StoredVolume, rays_of
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
 from matbench.results.repeats import Repeats, judged
-from matbench.runs.store import Outcome, Solved, Store
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import Solved, Store
 from matbench.scene import Scene
 
 AnyMetric = Metric | VolumeMetric | PredictionMetric

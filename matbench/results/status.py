@@ -11,7 +11,8 @@ from attrs import frozen
 from matbench.plans.plan import Cell, Plan
 from matbench.results import freshness
 from matbench.runs.lock import Work, is_locked, locked
-from matbench.runs.store import FINAL, Outcome, Store
+from matbench.runs.outcome import FINAL, Outcome
+from matbench.runs.store import Store
 
 
 @frozen

@@ -8,7 +8,8 @@ from zipfile import ZIP_STORED, ZipFile
 
 from matbench.files.unzip import ArchiveError, members, opened, unpack
 from matbench.plans.plan import Cell
-from matbench.runs.store import Outcome, Store
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import Store
 
 FILES = {
     "cell.json": 1 << 26,

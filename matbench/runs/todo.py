@@ -6,7 +6,8 @@ from attrs import field, frozen
 
 from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
-from matbench.runs.store import FINAL, Outcome, Store
+from matbench.runs.outcome import FINAL, Outcome
+from matbench.runs.store import Store
 
 
 @frozen(eq=False)

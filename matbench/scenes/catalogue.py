@@ -22,6 +22,7 @@ from matbench.spec import Spec, expand, label, parse
 
 DATA_VARIABLE = "MATBENCH_DATA"
 PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
+SYNTHETIC_SCENES = ("synthetic/box", "synthetic/curved", "synthetic/weak")
 GROUPS = {"paper": PAPER_SCENES}
 """What a selector may name instead of a pattern."""
 
@@ -244,3 +245,12 @@ def _load(name: str, options: Mapping[str, str], data: str | Path | None) -> Sce
         return scene
     partner = scene.pair_steps if scene.ref + scene.pair_steps < scene.n else -scene.pair_steps
     return evolve(scene, regions=regions(scene.views[scene.ref], scene.truth[scene.ref], partner))
+
+
+def default_scenes(data: str | Path | None = None) -> tuple[list[str], list[str]]:
+    """Three synthetic scenes and the paper's three: those that are present, and those missing."""
+    known = listings(data)
+    present = {name for name, listing in known.items() if isinstance(listing, Listing) and listing.present}
+    synthetic = [name for name in SYNTHETIC_SCENES if name in present]
+    paper = [name for name in PAPER_SCENES if name in present]
+    return synthetic + paper, [name for name in PAPER_SCENES if name not in present]

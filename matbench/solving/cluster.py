@@ -32,7 +32,8 @@ from matbench.plans.limits import cores
 from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
 from matbench.runs import parcels
-from matbench.runs.store import Outcome, Store
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import Store
 from matbench.scenes.catalogue import data_root, load_scene
 from matbench.solving.keeper import Keeper
 from matbench.solving.worker import Job

@@ -15,7 +15,8 @@ from attrs import evolve
 from cattrs.preconf.json import make_converter
 from numpy.typing import NDArray
 
-from matbench.runs.store import Outcome, read_maps
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import read_maps
 from matbench.scene import Scene
 from matbench.solving.worker import OUTCOME
 

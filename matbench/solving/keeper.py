@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from attrs import evolve
 
-from matbench.runs.store import Outcome, Store
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import Store
 from matbench.solving import processes
 from matbench.solving.keeper_process import keep
 from matbench.solving.worker import Job

@@ -27,7 +27,8 @@ from attrs import define, evolve, field
 from matbench.errors import UserError
 from matbench.plans import plugins
 from matbench.plans.limits import cores
-from matbench.runs.store import FINAL, Outcome, Store, maps_digest, write_cell
+from matbench.runs.outcome import FINAL, Outcome
+from matbench.runs.store import Store, maps_digest, write_cell
 from matbench.scenes import views_only
 from matbench.solving import confinement, disturbance, errand, intake, memory, processes
 from matbench.solving.child import Child, Log

@@ -10,7 +10,8 @@ from attrs import evolve
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
-from matbench.runs.store import Outcome, Store, write_cell
+from matbench.runs.outcome import Outcome
+from matbench.runs.store import Store, write_cell
 from matbench.solving.environment import kernel_cache_in_use, without_main
 from matbench.solving.keeper import Keeper, dismiss
 from matbench.solving.worker import Job

@@ -30,7 +30,7 @@ from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
 from matbench.plans.plan import Cell
 from matbench.plans.settings import Settings
-from matbench.runs.store import FINAL, Outcome, Status
+from matbench.runs.outcome import FINAL, Outcome, Status
 from matbench.scene import Scene
 from matbench.scenes import views_only
 from matbench.solving import memory, processes

@@ -15,9 +15,10 @@ from places import PROGRAMS
 
 from matbench import Context, Range, Scene
 from matbench.algorithms.command import Command
-from matbench.comparison import default_algorithms, prepare
+from matbench.comparison import prepare
 from matbench.errors import UserError
 from matbench.plans.plan import methods
+from matbench.plans.plugins import default_algorithms
 from matbench.scenes.catalogue import load_scene
 from matbench.solving.check_scenes import mirrored
 from matbench.solving.method_check import check

@@ -8,8 +8,9 @@ from matbench.algorithm import Algorithm, Context
 from matbench.algorithms.materiality import Materiality
 from matbench.algorithms.multiview_sgm import MultiviewSGM
 from matbench.errors import UserError
+from matbench.parameters import build, parameters, refuse_silent, values_of
 from matbench.scene import Range, Scene
-from matbench.spec import build, parameters, parse, refuse_silent, values_of
+from matbench.spec import parse
 
 PAPER = Materiality(**Materiality.presets["paper"])
 FISTA = Materiality(optimiser="fista", passes=5, views=5)

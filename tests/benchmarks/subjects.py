@@ -16,7 +16,7 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from matbench import spec
+from matbench import parameters
 from matbench.algorithm import Context
 from matbench.datasets.synthetic import SYNTHETIC
 from matbench.scene import Scene
@@ -56,7 +56,7 @@ def _of(module: str, name: str) -> Any:
 def instance(name: str) -> Any:
     """A method of `METHODS`."""
     entry, preset = METHODS[name]
-    return spec.build(entry.name, entry.load(), {"preset": preset} if preset else {})
+    return parameters.build(entry.name, entry.load(), {"preset": preset} if preset else {})
 
 
 @cache

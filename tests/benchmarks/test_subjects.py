@@ -5,7 +5,7 @@ import tomllib
 import subjects
 from places import ROOT
 
-from matbench import spec
+from matbench import parameters
 from matbench.plans import plugins
 
 
@@ -14,8 +14,8 @@ def test_all_built_in_methods_and_presets_are_subjects() -> None:
     wanted = set()
     for name in named:
         cls = plugins.algorithm(name).load()
-        if not spec.required(cls):
-            wanted |= {name, *(f"{name}[preset={preset}]" for preset in spec.presets_of(cls))}
+        if not parameters.required(cls):
+            wanted |= {name, *(f"{name}[preset={preset}]" for preset in parameters.presets_of(cls))}
     assert set(subjects.METHODS) == wanted, "install it again if an entry point is new: pip install -e '.[test]'"
     assert set(named) - wanted == {"command"}, "what must be told something is timed by nobody"
 

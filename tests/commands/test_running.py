@@ -20,7 +20,7 @@ from matbench.commands.console import Console
 from matbench.commands.progress import SHOWN, Progress
 from matbench.plans.plan import Cell, Method
 from matbench.reports import tables, terminal
-from matbench.runs.store import Outcome
+from matbench.runs.outcome import Outcome
 
 LINE = ["compare", "-a", "flat", "raises", "--plugin", str(METHODS), "-s", "synthetic/box[size=96x72 noise=0,4]"]
 LINE += ["--out", "run"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import matbench
-from matbench import spec
+from matbench import parameters
 from matbench.algorithms.command import Command
 from matbench.cli import main
 from matbench.errors import UserError
@@ -238,9 +238,9 @@ def test_paths_are_parameters_as_others_are() -> None:
         def __init__(self, file: Path, without=Path("a")) -> None:  # type: ignore[no-untyped-def]
             self.file, self.without = file, without
 
-    made = spec.build("method", Method, {"file": "~/b", "without": "c"})
+    made = parameters.build("method", Method, {"file": "~/b", "without": "c"})
     assert (made.file, made.without) == (Path.home() / "b", Path("c"))
-    assert spec.values_of(made) == {"file": str(Path.home() / "b"), "without": "c"}
-    assert spec.changed(made) == {"file": str(Path.home() / "b"), "without": "c"}
-    assert spec.describe(Path) == "a path"
-    assert spec.paths_of(made) == {"file": made.file, "without": made.without}
+    assert parameters.values_of(made) == {"file": str(Path.home() / "b"), "without": "c"}
+    assert parameters.changed(made) == {"file": str(Path.home() / "b"), "without": "c"}
+    assert parameters.describe(Path) == "a path"
+    assert parameters.paths_of(made) == {"file": made.file, "without": made.without}

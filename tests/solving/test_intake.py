@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from matbench import load_scene
-from matbench.runs.store import Outcome
+from matbench.runs.outcome import Outcome
 from matbench.solving import intake
 from matbench.solving.worker import OUTCOME
 

@@ -12,7 +12,7 @@ from places import METHODS
 from matbench import comparison
 from matbench.plans.settings import Settings
 from matbench.rescoring import open_run
-from matbench.runs.store import Outcome
+from matbench.runs.outcome import Outcome
 from matbench.runs.todo import explained
 from matbench.solving import confinement
 
