@@ -42,5 +42,5 @@ def test_the_page_is_given_the_map() -> None:
     made = CODE_MAP["on_page_markdown"](page)
     assert CODE_MAP["PLACE"] in page
     assert CODE_MAP["PLACE"] not in made
-    assert "| `keeper` | Keepers: " in made
+    assert "| `keeper` | Keepers, as the run sees them: " in made
     assert CODE_MAP["on_page_markdown"]("another page") == "another page"
