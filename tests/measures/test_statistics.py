@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from matbench.measures import statistics
 from matbench.measures.statistics import EXACT, intervals, paired_effect, paired_effects
 
 
@@ -42,3 +43,13 @@ def test_neither_order_nor_sign_nor_company_changes_an_interval(scenes: int) -> 
         assert paired_effect(list(row[::-1])).low == a
         assert paired_effect(list(-row)).low == -b
     assert [e.high for e in paired_effects([*rows[:7], [1.0, 2.0], *rows[7:]])][8:] == high[7:].tolist()
+
+
+def test_the_interval_of_a_median_holds_it_as_often_as_it_says() -> None:
+    draw = np.random.default_rng(1)
+    held = 0
+    for _ in range(300):
+        median, low, high = statistics.median_interval(draw.exponential(size=25))
+        assert low <= median <= high
+        held += low <= np.log(2) <= high
+    assert held >= 282
