@@ -1,13 +1,8 @@
 """Whatever a method does to its process costs its cell alone; limits are enforced from outside."""
 
-import os
 import re
-import subprocess
-import sys
-import time
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import psutil
 import pytest
@@ -15,8 +10,6 @@ from attrs import evolve
 from places import METHODS, ROUGH
 
 from matbench import comparison
-from matbench.errors import UserError
-from matbench.plans import limits
 from matbench.plans.settings import Settings
 from matbench.solving.environment import without_main
 from matbench.solving.keeper import Keeper, dismiss
@@ -138,101 +131,3 @@ def test_a_keeper_shares_a_process_among_cells_that_want_the_same(tmp_path: Path
     dismiss([keeper])
     assert pids[0] == pids[1]
     assert len(set(pids)) == 3
-
-
-def test_processes_threads_and_marks(tmp_path: Path) -> None:
-    names = [f"tells[mark={mark}]" for mark in range(4)]
-
-    def look(folder: str, **settings: object) -> tuple[list[float], pd.DataFrame]:
-        ready = comparison.prepare(
-            names, SMALL, out=tmp_path / folder, plugin=[ROUGH, METHODS], settings=Settings(**settings)
-        )
-        ready.run()
-        scene = next(iter(ready.scenes.values()))
-        maps = [ready.store.disparity(cell)[scene.ref] for cell in ready.plan.cells]
-        return [float(np.unique(one).item()) for one in maps], ready.tables().cells
-
-    processes, cells = look("alone", threads=1)
-    assert len(set(processes)) == 4, "one process a cell"
-    assert cells.alone.all()
-    assert (cells.threads == 1).all()
-    log = (tmp_path / "alone" / "cells" / cells.cell[0] / "log.txt").read_text()
-    assert log.startswith("threads 1 1 1 1 1 True"), log
-
-    processes, cells = look("shared", isolation="shared", threads=2)
-    assert len(set(processes)) == 1, "one process for all"
-    log = (tmp_path / "shared" / "cells" / cells.cell[3] / "log.txt").read_text()
-    assert log.split()[1:6:4] == ["2", "2"], log
-
-    processes, cells = look("many", jobs=4)
-    assert len(set(processes)) == 4
-    assert not cells.alone.any(), "others ran meanwhile"
-    assert (cells.threads == max(1, limits.cores() // 4)).all()
-
-
-def _start(folder: Path, *more: str) -> subprocess.Popen[str]:
-    line = [sys.executable, "-m", "matbench", "compare", "-a", "breeds", "loops", "tells[wait=3600]", "-s", SMALL]
-    line += ["--plugin", str(ROUGH), "--out", str(folder), "--jobs", "3", *more]
-    pipe = subprocess.PIPE
-    process = subprocess.Popen(line, stdout=pipe, stderr=subprocess.STDOUT, text=True, start_new_session=True)
-    end = time.monotonic() + 120
-    while len(list(folder.glob("cells/.*"))) != 2 or not list(folder.glob("cells/[0-9a-f]*")):
-        assert process.poll() is None, process.communicate()[0]
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.05)
-    time.sleep(1)
-    return process
-
-
-def test_nothing_outlives_a_run(tmp_path: Path) -> None:
-    process = _start(tmp_path / "run")
-    children = psutil.Process(process.pid).children(recursive=True)
-    assert len(children) >= 5, "a server, keepers, methods"
-    process.kill()
-    process.wait()
-    assert not psutil.wait_procs(children, timeout=60)[1]
-    end = time.monotonic() + 60
-    while list((tmp_path / "run" / "cells").glob(".*")):
-        assert time.monotonic() < end, "drafts are left"
-        time.sleep(0.05)
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("--timeout 0", "timeout '0' is not a positive number of seconds, such as 600, or none"),
-        ("--timeout=-1", "timeout '-1' is not a positive"),
-        ("--timeout x", "timeout 'x' is not a positive"),
-        ("--timeout nan", "timeout 'nan' is not a positive"),
-        ("--memory '3 bananas'", "memory '3 bananas' is not an amount such as 512 (MiB), 512M or 4G"),
-        ("--memory 0", "memory '0' is not an amount"),
-        ("--jobs 0", "jobs '0' is not a whole number from 1 to 256"),
-        ("--threads 1000", "threads '1000' is not a whole number from 1 to 256"),
-        ("--isolation none", "isolation 'none' is not process or shared"),
-    ],
-)
-def test_limits_that_make_no_sense_are_refused(
-    line: str, said: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import shlex
-
-    from matbench.cli import main
-
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["compare", "-a", "sgbm", "-s", SMALL, *shlex.split(line)])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err.startswith(f"matbench: {said}")
-    assert not list(tmp_path.iterdir())
-
-
-def test_limits_as_people_write_them() -> None:
-    assert limits.mebibytes("4G") == limits.mebibytes("4 GiB") == limits.mebibytes(4096) == 4096
-    assert limits.mebibytes("1.5g") == 1536
-    assert limits.seconds("0.5") == 0.5
-    assert limits.seconds("none") is None
-    with pytest.raises(UserError, match="jobs"):
-        Settings(jobs=2.5)  # type: ignore[arg-type]
-    assert limits.crowded(limits.cores(), 1) == ""
-    assert f"share {limits.cores()} cores" in limits.crowded(limits.cores(), 2)
-    assert os.cpu_count()
