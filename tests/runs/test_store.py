@@ -3,9 +3,6 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +11,7 @@ from attrs import evolve
 from compared import SMALL, cells, compare
 from launcher import SCENE
 from places import METHODS
-from resuming import PLUGIN, finished
+from resuming import finished
 
 from matbench import comparison
 from matbench.errors import UserError
@@ -84,29 +81,6 @@ def test_recordings_are_written_on_request_and_found_by_name(tmp_path: Path) -> 
     before = found.stat().st_mtime_ns
     compare(tmp_path, "flat", "noise", record=True)
     assert found.stat().st_mtime_ns == before
-
-
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[[Path], int]]:
-    """Start a run of 50 cells in a folder, when the one before has ended; the process that works on it."""
-    (tmp_path / "plugin.py").write_text(PLUGIN)
-    (tmp_path / "journal").touch()
-    environment = {**os.environ, "JOURNAL": str(tmp_path / "journal")}
-    line = [sys.executable, str(LAUNCHER), str(tmp_path / "plugin.py")]
-    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment) as launcher:
-        assert launcher.stdin is not None
-        assert launcher.stdout is not None
-        launched = 0
-
-        def begin(folder: Path) -> int:
-            nonlocal launched
-            assert launched == 0 or launcher.stdout.readline() == "ended\n"  # type: ignore[union-attr]
-            launched += 1
-            print(folder, file=launcher.stdin, flush=True)
-            return int(launcher.stdout.readline())  # type: ignore[union-attr]
-
-        yield begin
-        launcher.stdin.close()
 
 
 def test_a_file_system_that_is_lost_is_not_taken_for_an_empty_one(

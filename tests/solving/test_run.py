@@ -126,17 +126,6 @@ def test_a_doubtful_cell_is_due_again_only_if_asked_for(tmp_path: Path) -> None:
     assert why == "its seconds are in doubt: others took 1 processor seconds of 1 s"
 
 
-def run(folder: Path, *algorithms: str, **settings: object) -> pd.DataFrame:
-    ready = comparison.prepare(
-        list(algorithms), SMALL, out=folder, plugin=[ROUGH, METHODS], settings=Settings(**settings)
-    )
-    ready.run()
-    cells = ready.tables().cells.set_index("algorithm")
-    cells["log"] = [(folder / "cells" / key / "log.txt").read_text(errors="replace") for key in cells.cell]
-    assert not list((folder / "cells").glob(".*")), "no drafts"
-    return cells
-
-
 def test_processes_threads_and_marks(tmp_path: Path) -> None:
     names = [f"tells[mark={mark}]" for mark in range(4)]
 
