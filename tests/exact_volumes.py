@@ -8,7 +8,7 @@ from matbench.scene import Scene
 SMALL = {"size": "96x72"}
 
 
-def _along(stored: StoredVolume, scene: Scene) -> Rays:
+def along(stored: StoredVolume, scene: Scene) -> Rays:
     """The rays of all known pixels."""
     (rays,) = rays_of(stored, scene, [np.ones((scene.height, scene.width), bool)])
     return rays

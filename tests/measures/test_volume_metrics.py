@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from exact_volumes import SMALL, _along
+from exact_volumes import SMALL, along
 
 from matbench.datasets.synthetic import SYNTHETIC
 from matbench.measures.volume_metrics import (
@@ -102,12 +102,12 @@ def test_what_lies_behind_the_surface_does_not_count() -> None:
 def test_exact_materialities_are_perfect_and_shifted_ones_are_not(exact: tuple[Volume, StoredVolume]) -> None:
     volume, stored = exact
     scene = SYNTHETIC.load("box", SMALL, None)
-    rays = _along(stored, scene)
+    rays = along(stored, scene)
     assert rays.materiality.shape == (scene.height * scene.width, volume.space.planes)
     assert recall(rays, 1) == 100
     assert precision(rays, 1) > 98, "but for what only another view's rays meet at the edges"
     assert brier(rays) < 0.01
     shifted = Volume(volume.space, np.roll(volume.values, 4, axis=1), volume.views)  # four planes nearer
-    wrong = _along(StoredVolume.of(shifted), scene)
+    wrong = along(StoredVolume.of(shifted), scene)
     assert f_score(wrong, 1) < 15
     assert brier(wrong) > 10 * brier(rays)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve
-from exact_volumes import SMALL, _along
+from exact_volumes import SMALL, along
 
 from matbench.datasets.synthetic import SYNTHETIC
 from matbench.measures.volume_metrics import (
@@ -26,7 +26,7 @@ def test_the_truth_is_found_in_a_volume_over_fewer_views_and_finer_planes() -> N
     known = np.full((scene.height, space.samples), np.nan, np.float32)
     known[:, :: space.fineness] = wide
     stored = StoredVolume.of(surface(space, {1: known}, (0, 2, 4)))
-    rays = _along(stored, scene)
+    rays = along(stored, scene)
     assert recall(rays, 0.5) == precision(rays, 0.5) == 100
     tied = rays.surface % 1 == 0.5  # midway between two planes, where either is nearest
     assert tied.mean() < 0.01
@@ -78,6 +78,6 @@ def test_unknown_truth_does_not_count(exact: tuple[Volume, StoredVolume]) -> Non
     truth = scene.truth[2].copy()
     truth[:, 40:] = np.nan
     half = evolve(scene, truth={2: truth})
-    rays = _along(exact[1], half)
+    rays = along(exact[1], half)
     assert len(rays.surface) == 40 * scene.height
     assert np.isfinite(rays.surface).all()

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pandas as pd
+from attrs import evolve
 
-from matbench.reports import costs, tables, terminal
+from matbench.reports import costs, page, tables, terminal
+from matbench.reports.content import Report
+from matbench.reports.numbers import Numbers
 
 
 def _cells(**columns: list[object]) -> pd.DataFrame:
@@ -42,3 +45,20 @@ def test_times_of_two_machines_are_not_ranked() -> None:
     assert ranked(same) == ranked(same.drop(columns="machine")) == {"a", "b", "c"}
     printed = terminal.tables(_results(cells), cells)
     assert "another machine" in str(printed[0].caption)
+
+
+def test_costs_are_those_of_the_printed_tables(report: Report) -> None:
+    company = report.cells.assign(alone=[True, True, True, False, True, None], machine="a")
+    rows = tables.summary(report.results, company)
+    labelled = evolve(report, results=tables.labelled(report.results), cells=tables.labelled(company))
+    made = Numbers(labelled, tables.shared(report.results, company))
+    shown = {m: seconds for m, (seconds, *_) in made.costs["seconds"].items()}
+    assert shown == {m: None if np.isnan(v) else v for m, v in rows["seconds"].items()}
+    assert shown["good"] == 0.5
+    marked = [entry for entry in made.costs["seconds"].values() if "not ranked" in entry[3:]]
+    assert [entry[:3] for entry in marked] == [[1.5, "1.50", tables.NOT_RANKED]], "one ran while others did"
+    assert made.costs["peak_mb"]["good"][:2] == [100, "100"]
+    html = page.render(evolve(report, cells=company))
+    note = costs.timing_note(company)
+    assert f"{note[0].upper()}{note[1:]}" in html
+    assert "not alone" not in page.render(report)

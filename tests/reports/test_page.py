@@ -197,3 +197,21 @@ def test_calibration_is_drawn_where_volumes_were_kept(report: Report) -> None:
     assert "share of points with a surface" in html
     assert hostile not in html
     assert "Calibration of" not in page.render(evolve(report, reliability=curves.iloc[:0]))
+
+
+def test_parameters_stand_in_their_groups(report: Report) -> None:
+    names = str(report.cells["algorithm"].iloc[0]), str(report.cells["params"].fillna("").iloc[0])
+    one = evolve(
+        report,
+        parameters={names: {"passes": 1, "window": 5, "fill": True}},
+        groups={names[0]: {"passes": "fixed_point", "window": "matching"}},
+    )
+    told = page.render(one).partition("<summary>all parameters</summary>")[2].partition("</details>")[0]
+    assert re.sub("</?(p|code)>", "", told).split() == [
+        "fill=True",
+        "fixed",
+        "point:",
+        "passes=1",
+        "matching:",
+        "window=5",
+    ]

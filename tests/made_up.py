@@ -4,7 +4,6 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-import pytest
 from numpy.typing import NDArray
 
 from matbench.reports.content import Key, Report
@@ -29,8 +28,7 @@ def score(method: int, place: int, region: int, metric: int) -> float:
     return 10.0 * (method + 1) + place + region / 10 + metric / 100
 
 
-@pytest.fixture
-def report() -> Report:
+def made_up() -> Report:
     """`broken` fails on the second scene; the hostile method's map on the first is all NaN."""
     scenes = {name: scene(name) for name in SCENES}
     cells: list[tuple[object, ...]] = []
