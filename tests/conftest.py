@@ -61,6 +61,19 @@ def report() -> "Report":
 
 
 @pytest.fixture
+def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A person without HOME, of whom the system's list of users knows nothing."""
+    for name in ("HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "MATBENCH_DATA", "NUMBA_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    pwd = pytest.importorskip("pwd", reason="homes are named otherwise here")
+
+    def unknown(_: object) -> None:
+        raise KeyError
+
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+
+
+@pytest.fixture
 def machines(tmp_path: Path) -> Iterator[Machines]:
     """A Dask cluster without any workers yet."""
     pytest.importorskip("distributed", reason="Dask is not installed: pip install 'matbench-stereo[cluster]'")

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from attrs import evolve
 
-from matbench.reports import page, page_figures, tables
+from matbench.reports import page, tables
 from matbench.reports.content import Report
 
 
@@ -164,17 +164,6 @@ def test_ten_methods_on_ten_scenes_of_quarter_size_stay_below_15_MB(report: Repo
     size = (tmp_path / "report.html").stat().st_size
     print(f"{size / 1e6:.1f} MB, {time.process_time() - before:.1f} s of CPU time")
     assert size < 15e6
-
-
-def test_the_figure_takes_names_literally(report: Report) -> None:
-    rows = tables.summary(report.results, report.cells)
-    rows.index = ["$x^$ \x07", "<b>&", "c"]
-    figure = page_figures.cost(rows, "total_bad_1 all", "%")
-    assert figure is not None
-    text = page_figures.svg(figure)
-    assert "$x^$ \N{REPLACEMENT CHARACTER}" in text
-    assert "&lt;b&gt;&amp;" in text
-    assert page_figures.cost(rows.assign(ranked=False), "total_bad_1 all", "%") is None
 
 
 def test_regions_over_all_views_stand_in_the_summary(report: Report) -> None:
