@@ -34,7 +34,7 @@ def test_a_finished_run_and_cells_of_other_code(tmp_path: Path, capsys: pytest.C
 
 
 def test_a_run_under_way_names_what_runs_and_guesses_the_rest() -> None:
-    work = Work(4711, "host", time.time() - 90)
+    work = Work(Path("run"), 4711, "host", time.time() - 90)
     cell = Cell(Method("flat", {}), "synthetic/box", "", 0, "0" * 16)
     found = Standing(Path("run"), 5, {"ok": 2, "failed": 1}, [(cell, 61.0)], work, 3, 125.0)
     lines = _lines(found)
@@ -50,5 +50,5 @@ def test_a_run_under_way_names_what_runs_and_guesses_the_rest() -> None:
 def test_stale_tables_are_said_only_when_nobody_works() -> None:
     stale = Standing(Path("my run"), 1, {"ok": 1}, tables="cells were computed since")
     assert _lines(stale)[-1] == "tables are stale, cells were computed since: type matbench score 'my run'"
-    work = Work(1, "host", time.time())
+    work = Work(Path("r"))
     assert not [line for line in _lines(Standing(Path("r"), 1, {}, work=work, left=1, tables="old")) if "stale" in line]

@@ -1,9 +1,11 @@
 """Where a run stands, from its folder alone."""
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from finished_runs import SMALL, done
+from forking import beside
 from places import METHODS
 
 from matbench import comparison
@@ -47,13 +49,24 @@ def test_stale_cells_are_counted_and_removed(tmp_path: Path) -> None:
     found = standing(folder)
     assert (found.cells, found.stale) == (1, 1)
     assert found.stale_bytes == sum(path.stat().st_size for path in old.rglob("*"))
-    with locked(folder), pytest.raises(UserError, match="in use"):
-        prune(folder)
-    assert old.exists()
     assert prune(folder) == 1
     assert not old.exists()
     assert prune(folder) == 0
     assert standing(folder).counts == {"ok": 1}
+
+
+def test_while_a_process_works_on_it_nothing_is_removed(tmp_path: Path) -> None:
+    folder = done(tmp_path / "run", "flat")
+    held = ExitStack()
+
+    def hold() -> int:
+        return held.enter_context(locked(folder)).pid
+
+    with beside(hold):
+        assert standing(folder).counts == {"ok": 1}, "it can be looked at"
+        with pytest.raises(UserError, match="in use"):
+            prune(folder)
+    assert prune(folder) == 0
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
