@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from matbench import UserError, load_scene
+from matbench import load_scene
 from matbench.errors import UserError
 from matbench.scenes import views_only
 
