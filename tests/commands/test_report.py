@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from papers import made
 from typing_commands import run as matbench
 
 from matbench.errors import UserError
@@ -22,7 +21,11 @@ def run(report: Report, tmp_path: Path) -> Path:
 
 
 def test_the_command_prints_or_writes(run: Path, report: Report, capsys: pytest.CaptureFixture[str]) -> None:
-    assert matbench(capsys, "report", str(run), "--format", "md") == (0, paper.markdown(made(report)), "")
+    assert matbench(capsys, "report", str(run), "--format", "md") == (
+        0,
+        paper.markdown(paper.sheet(report.results, report.cells)),
+        "",
+    )
     status, out, _ = matbench(capsys, "report", str(run))
     assert status == 0
     assert "10.51" in out

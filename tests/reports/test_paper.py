@@ -9,13 +9,16 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from papers import made
 
 from matbench.reports import paper, tables
 from matbench.reports.content import Report
 from matbench.reports.numbers import Numbers
 
 AWKWARD = r"50% of_a\b {c}|d & $e$ #f ~g ^h *i* `j` <k> 'l' " + '"m" ä – 雪'
+
+
+def made(report: Report, **options: object) -> paper.Sheet:
+    return paper.sheet(report.results, report.cells, **options)  # type: ignore[arg-type]
 
 
 def awkward(report: Report) -> Report:
