@@ -20,6 +20,8 @@ from matbench.solving import check_scenes
 if TYPE_CHECKING:
     from following import Desk
 
+    from matbench.reports.content import Report
+
 # numba does not notice changes of what a kernel calls in another file: each state of the code has its own cache
 os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))
 # tests neither find nor touch the scenes of whoever runs them
@@ -48,6 +50,27 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Desk]":
 
     with pytest.MonkeyPatch.context() as patch:
         yield Desk(tmp_path_factory.mktemp("desk"), patch)
+
+
+@pytest.fixture
+def report() -> "Report":
+    """A small run, made up, with hostile names."""
+    from made_up import made_up
+
+    return made_up()
+
+
+@pytest.fixture
+def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A person without HOME, of whom the system's list of users knows nothing."""
+    for name in ("HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "MATBENCH_DATA", "NUMBA_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    pwd = pytest.importorskip("pwd", reason="homes are named otherwise here")
+
+    def unknown(_: object) -> None:
+        raise KeyError
+
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """What `compare` shows: progress, tables within the width, and what a script gets instead."""
 
-import io
 import json
 import os
 import pty
@@ -16,66 +15,15 @@ import pytest
 from places import METHODS
 
 from matbench.cli import main
-from matbench.commands.console import Console
-from matbench.commands.progress import SHOWN, Progress
-from matbench.plans.plan import Cell, Method
-from matbench.reports import tables, terminal
-from matbench.runs.outcome import Outcome
+from matbench.reports import tables
 
 LINE = ["compare", "-a", "flat", "raises", "--plugin", str(METHODS), "-s", "synthetic/box[size=96x72 noise=0,4]"]
+
+
 LINE += ["--out", "run"]
+
+
 PLAIN = {name: value for name, value in os.environ.items() if name not in ("FORCE_COLOR", "NO_COLOR", "COLUMNS")}
-
-
-def cell(number: int, algorithm: str = "flat") -> Cell:
-    return Cell(Method(algorithm, {}), f"synthetic/{'box' * 20}{number}", "", 0, f"{algorithm}{number}")
-
-
-def shown(progress: Progress, width: int = 60) -> str:
-    console = Console(width=width, file=io.StringIO(), record=True, no_color=True)
-    console.print(progress._shown())
-    return console.export_text()
-
-
-def test_progress_names_what_runs_and_counts_what_is_left() -> None:
-    now = [0.0]
-    fast, slow = [cell(k) for k in range(6)], [cell(k, "slow") for k in range(2)]
-    progress = Progress(None, [*fast, *slow], done=2, clock=lambda: now[0])
-    progress("start", fast[0], None)
-    progress("start", slow[0], None)  # several at once, as with --jobs
-    assert progress.seconds_left() is None
-    text = shown(progress)
-    assert "2/10 cells" in text
-    assert "left" not in text
-    assert "flat on synthetic/box" in text
-    assert "slow on synthetic/box" in text
-    assert all(len(line) <= 60 for line in text.splitlines())
-    now[0] = 3.0
-    progress("done", fast[0], Outcome("ok", seconds=0.1))
-    # one of slow runs for 3 s already and is taken to need the mean of what is known: 5 * 3 + 3, two at once
-    assert progress.seconds_left() == pytest.approx((5 * 3 + 3) / 2)
-    now[0] = 33.0
-    progress("done", slow[0], Outcome("timeout", reason="took more than 30 s"))
-    # five of 3 s and one of 33 s are waiting: two at once cannot be quicker than the longest
-    assert progress.seconds_left() == pytest.approx(33)
-    assert "4/10 cells · 1 failed · about 33 s left" in shown(progress, 70)
-    for one in (*fast[1:], slow[1]):
-        progress("start", one, None)
-    assert len(progress._running) == 6
-    for one in (*fast[1:], slow[1]):
-        progress("done", one, Outcome("ok"))
-    assert progress.seconds_left() == 0
-    assert progress.done == progress.total == 10
-
-
-def test_many_cells_at_once_stay_a_few_lines() -> None:
-    many = [cell(k) for k in range(SHOWN + 5)]
-    progress = Progress(None, many)
-    for one in many:
-        progress("start", one, None)
-    lines = shown(progress).splitlines()
-    assert len(lines) == SHOWN + 2
-    assert lines[-1].strip() == "and 5 more"
 
 
 def in_terminal(*tokens: str, folder: Path) -> tuple[int, str]:
@@ -141,24 +89,6 @@ def test_a_run_speaks_to_people_and_to_scripts(
     assert facts["table"][0]["regions"]["all"] == pytest.approx(summary.loc["flat", "total_bad_1 all"])
     assert facts["table"][1]["regions"]["all"] is None
     assert all((tmp_path / path).exists() for path in facts["files"].values())
-
-
-def test_cells_that_fail_alike_share_a_row() -> None:
-    names = ["algorithm", "params", "scene", "seed", "status", "seconds", "peak_mb", "reason"]
-    rows = [
-        ("raises", "", f"synthetic/s{k}", 0, "failed", None, None, f"no digits (log: cells/{k:016x}/log.txt)")
-        for k in range(9)
-    ]
-    cells = pd.DataFrame([*rows, ("slow", "", "synthetic/s1", 0, "timeout", None, None, "")], columns=names)
-    results = pd.DataFrame(columns=["algorithm", "params", "scene", "region", "metric", "value", "unit"])
-    console = Console(width=80, file=io.StringIO(), record=True)
-    console.print(terminal.tables(results, cells)[-1])
-    text = console.export_text()
-    assert "10 cells without a score" in text
-    assert "and 6 more" in text
-    assert text.count("no digits") == 1
-    assert "cells/0000000000000000/log.txt" in "".join(text.split()), "that of the first"
-    assert "timeout" in text
 
 
 def test_a_run_without_a_single_score_says_so(

@@ -1,27 +1,17 @@
 """The registry of Middlebury's files: whole, consistent, and true of the real files."""
 
-import json
 import re
 from math import ceil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from registered import KNOWN, SCENES
 
-from matbench.datasets import make_registry
 from matbench.datasets.middlebury import Middlebury
-from matbench.datasets.registry import REGISTRY, YEARS, registry
 from matbench.datasets.stored import ROUND_UP
-from matbench.errors import UserError
 from matbench.files.images import pixel_digests, read_size
 
-KNOWN = {year: registry(year) for year in YEARS}
-SCENES = [
-    (year, name, size, facts)
-    for year, known in KNOWN.items()
-    for name, sizes in known.scenes.items()
-    for size, facts in sizes.items()
-]
 IDS = [f"{year}-{name}-{size}" for year, name, size, _ in SCENES]
 
 
@@ -45,37 +35,6 @@ def test_each_scene_has_a_file_for_every_view_and_truth(year, name, size, facts)
         assert 0 < count < 5_000_000
         assert re.fullmatch(r"[0-9a-f]{64} [0-9a-f]{64}", f"{sha256} {pixels}")
     assert facts.largest % ROUND_UP == 0 or facts.largest == layout.largest
-
-
-def test_the_file_is_as_its_script_writes_it() -> None:
-    assert make_registry.text(json.loads(REGISTRY.read_text())) == REGISTRY.read_text()
-
-
-def test_it_says_what_the_manifest_says(data_root: Path) -> None:
-    manifest = json.loads((data_root / "manifest.json").read_text())
-    written = json.loads(REGISTRY.read_text())
-    for year in YEARS:
-        assert make_registry.scenes(year, manifest) == written[year]["scenes"]
-    of_scenes = {name for name in manifest if not name.startswith("middlebury/eval_v2/")}
-    assert len(of_scenes) == len(SCENES), "every scene and size of the manifest is known"
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"gt_grey_per_px": 4}, "in the layout"),
-        ({"unknown": 0}, "in the layout"),
-        ({"views": 8}, "in the layout"),
-        (None, "no file of view 3"),
-    ],
-)
-def test_a_manifest_that_contradicts_the_layouts_is_refused(change, said: str) -> None:
-    facts = {"views": 9, "gt_grey_per_px": 8, "gt_steps": 4, "unknown": None, "gt": {"disp2.pgm": 1, "disp6.pgm": 1}}
-    facts |= {"size": [4, 3], "unit_disparity_px": {"2": [1, 2]}} | (change or {})
-    names = [*(f"im{k}.ppm" for k in range(9) if change or k != 3), "disp2.pgm", "disp6.pgm"]
-    files = {name: {"bytes": 1, "sha256": "0" * 64, "pixels": "0" * 64} for name in names}
-    with pytest.raises(UserError, match=said):
-        make_registry.scenes("2001", {"middlebury/scenes2001/data/new": {"facts": facts, "files": files}})
 
 
 @pytest.mark.parametrize(("year", "name", "size", "facts"), SCENES, ids=IDS)

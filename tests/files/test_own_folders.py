@@ -8,24 +8,8 @@ import pytest
 
 from matbench.errors import UserError
 from matbench.files.own_folders import cache_folder, data_folder
-from matbench.plans.plugins import kernel_cache
-from matbench.scenes.catalogue import data_root
-from matbench.solving.environment import kernels_kept
 
 FOLDERS = [(data_folder, "XDG_DATA_HOME", ".local/share"), (cache_folder, "XDG_CACHE_HOME", ".cache")]
-
-
-@pytest.fixture
-def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A person without HOME, of whom the system's list of users knows nothing."""
-    for name in ("HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "MATBENCH_DATA", "NUMBA_CACHE_DIR"):
-        monkeypatch.delenv(name, raising=False)
-    pwd = pytest.importorskip("pwd", reason="homes are named otherwise here")
-
-    def unknown(_: object) -> None:
-        raise KeyError
-
-    monkeypatch.setattr(pwd, "getpwuid", unknown)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have other folders")
@@ -44,18 +28,6 @@ def test_without_a_home_it_is_said_what_to_set(homeless, folder, variable, tmp_p
         folder()
     monkeypatch.setenv(variable, str(tmp_path))
     assert folder() == tmp_path / "matbench"
-
-
-def test_kernels_lie_below_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert kernel_cache().parent == tmp_path / "matbench" / "kernels"
-
-
-def test_without_a_home_kernels_are_not_kept_and_there_are_no_scenes(homeless, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with kernels_kept():
-        assert data_root() is None
-    assert list(tmp_path.iterdir()) == [], "no folder called ~"
 
 
 HOMELESS = """

@@ -1,72 +1,23 @@
 """Prediction of a withheld view: carrying maps, colours, and the protocol from end to end."""
 
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from attrs import evolve
-from hypothesis import given
-from hypothesis import strategies as st
 
 import matbench
 from matbench.datasets.synthetic import SYNTHETIC
 from matbench.errors import UserError
 from matbench.measures.prediction import coverage, differences, hold_out, predict, psnr
-from matbench.measures.warping import TEAR, carry
 from matbench.regions import REGIONS
 from matbench.scene import Scene
 from matbench.scenes.views_only import without_truth
-
-NAN = np.nan
 
 
 @pytest.fixture(scope="module", params=["box", "curved", "spheres"])
 def scene(request: pytest.FixtureRequest) -> Scene:
     return SYNTHETIC.load(request.param, {"size": "160x120", "noise": "0"}, None)
-
-
-def _slow_carry(disparity: np.ndarray, steps: float) -> np.ndarray:
-    """The twin: pixel by pixel, segment by segment."""
-    height, width = disparity.shape
-    out = np.full((height, width), np.nan)
-
-    def put(y: int, x: float, value: float) -> None:
-        if 0 <= x < width and not out[y, int(x)] >= value:
-            out[y, int(x)] = value
-
-    for y, row in enumerate(disparity.astype(float)):
-        joined = [abs(steps) * abs(b - a) <= TEAR + 1e-4 for a, b in pairwise(row)]
-        for x, d in enumerate(row):
-            if np.isnan(d):
-                continue
-            if not (x > 0 and joined[x - 1] and x < width - 1 and joined[x]):
-                put(y, np.floor(x - steps * d + 0.5), d)
-            if x < width - 1 and joined[x]:
-                start, end = x - steps * d, x + 1 - steps * row[x + 1]
-                for column in range(width):
-                    if end - start > 1e-4 and start - 1e-4 <= column <= end + 1e-4:
-                        put(y, column, d + (column - start) / (end - start) * (row[x + 1] - d))
-    return out
-
-
-@given(st.integers(0, 2**32 - 1), st.sampled_from([-3, -1.5, -1, 1, 2, 2.5]), st.booleans())
-def test_carrying_has_a_slow_twin(seed: int, steps: float, smooth: bool) -> None:
-    rng = np.random.default_rng(seed)
-    values = rng.uniform(-2, 4, (3, 17))
-    disparity = (np.cumsum(values - 1, axis=1) / 8 if smooth else values).astype(np.float32)
-    disparity[rng.random(disparity.shape) < 0.1] = np.nan
-    np.testing.assert_allclose(carry(disparity, steps), _slow_carry(disparity, steps), atol=1e-9)
-
-
-def test_nearest_counts_and_slants_leave_no_holes() -> None:
-    flat = np.array([[1, 1, 1, 1, 4, 4, 1, 1, NAN]], np.float32)
-    # carried to -1 0 1 2 | 0 1 | 5 6; torn between
-    np.testing.assert_array_equal(carry(flat, 1)[0], [4, 4, 1, NAN, NAN, 1, 1, NAN, NAN])
-    slant = (np.arange(30) * -0.9)[None].astype(np.float32)
-    there = carry(slant, 1)[0]
-    assert np.isfinite(there).all(), "1.9 columns apart"
-    np.testing.assert_allclose(there, np.arange(30) / 1.9 * -0.9, atol=1e-5)
 
 
 def test_exact_maps_predict_well_and_wrong_ones_badly(scene: Scene) -> None:

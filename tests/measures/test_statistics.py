@@ -4,8 +4,10 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.stats import bootstrap
 
-from matbench.measures.statistics import EXACT, intervals, paired_effect, paired_effects
+from matbench.measures import statistics
+from matbench.measures.statistics import EXACT, Effect, intervals, paired_effect, paired_effects
 
 
 @pytest.mark.parametrize("scenes", range(2, 7))
@@ -42,3 +44,33 @@ def test_neither_order_nor_sign_nor_company_changes_an_interval(scenes: int) -> 
         assert paired_effect(list(row[::-1])).low == a
         assert paired_effect(list(-row)).low == -b
     assert [e.high for e in paired_effects([*rows[:7], [1.0, 2.0], *rows[7:]])][8:] == high[7:].tolist()
+
+
+def test_the_interval_of_a_median_holds_it_as_often_as_it_says() -> None:
+    draw = np.random.default_rng(1)
+    held = 0
+    for _ in range(300):
+        median, low, high = statistics.median_interval(draw.exponential(size=25))
+        assert low <= median <= high
+        held += low <= np.log(2) <= high
+    assert held >= 282
+
+
+def test_intervals_are_those_of_scipy() -> None:
+    values = np.sort(np.random.default_rng(3).normal(4, 2, (3, 9)))  # in the order and sign in which they are drawn
+    wanted = bootstrap((values,), np.mean, axis=-1, n_resamples=4999, method="percentile", batch=256, rng=0)
+    low, high = intervals(values)
+    assert low == pytest.approx(wanted.confidence_interval.low)
+    assert high == pytest.approx(wanted.confidence_interval.high)
+
+
+def test_many_effects_are_each_its_own() -> None:
+    rows = [[1.0, 2, 4, 3, 5, 2.5], [0.5], [], [1, np.nan, 2], [2.0, 2.0], [0.0, 0.0]]
+    for row, found in zip(rows, paired_effects(rows), strict=True):
+        alone = paired_effect(row)
+        assert np.array_equal(
+            [found.mean, found.low, found.high, found.size, found.scenes],
+            [alone.mean, alone.low, alone.high, alone.size, alone.scenes],
+            equal_nan=True,
+        )
+    assert paired_effects(rows)[4] == Effect(2, 2, 2, float("inf"), 2)

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from attrs import evolve
 
-from matbench.reports import page, page_figures, tables
+from matbench.reports import page, tables
 from matbench.reports.content import Report
 
 
@@ -166,17 +166,6 @@ def test_ten_methods_on_ten_scenes_of_quarter_size_stay_below_15_MB(report: Repo
     assert size < 15e6
 
 
-def test_the_figure_takes_names_literally(report: Report) -> None:
-    rows = tables.summary(report.results, report.cells)
-    rows.index = ["$x^$ \x07", "<b>&", "c"]
-    figure = page_figures.cost(rows, "total_bad_1 all", "%")
-    assert figure is not None
-    text = page_figures.svg(figure)
-    assert "$x^$ \N{REPLACEMENT CHARACTER}" in text
-    assert "&lt;b&gt;&amp;" in text
-    assert page_figures.cost(rows.assign(ranked=False), "total_bad_1 all", "%") is None
-
-
 def test_regions_over_all_views_stand_in_the_summary(report: Report) -> None:
     more = report.results[report.results["region"] == "mine"].assign(region="half_occluded", value=77.125)
     html = page.render(evolve(report, results=pd.concat([report.results, more])))
@@ -197,3 +186,21 @@ def test_calibration_is_drawn_where_volumes_were_kept(report: Report) -> None:
     assert "share of points with a surface" in html
     assert hostile not in html
     assert "Calibration of" not in page.render(evolve(report, reliability=curves.iloc[:0]))
+
+
+def test_parameters_stand_in_their_groups(report: Report) -> None:
+    names = str(report.cells["algorithm"].iloc[0]), str(report.cells["params"].fillna("").iloc[0])
+    one = evolve(
+        report,
+        parameters={names: {"passes": 1, "window": 5, "fill": True}},
+        groups={names[0]: {"passes": "fixed_point", "window": "matching"}},
+    )
+    told = page.render(one).partition("<summary>all parameters</summary>")[2].partition("</details>")[0]
+    assert re.sub("</?(p|code)>", "", told).split() == [
+        "fill=True",
+        "fixed",
+        "point:",
+        "passes=1",
+        "matching:",
+        "window=5",
+    ]

@@ -7,12 +7,9 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from matbench.cli import main
-from matbench.errors import UserError
 from matbench.reports import paper, tables
 from matbench.reports.content import Report
 from matbench.reports.numbers import Numbers
@@ -20,15 +17,15 @@ from matbench.reports.numbers import Numbers
 AWKWARD = r"50% of_a\b {c}|d & $e$ #f ~g ^h *i* `j` <k> 'l' " + '"m" ä – 雪'
 
 
+def made(report: Report, **options: object) -> paper.Sheet:
+    return paper.sheet(report.results, report.cells, **options)  # type: ignore[arg-type]
+
+
 def awkward(report: Report) -> Report:
     """The made-up run with one method called by all that LaTeX, Markdown and CSV read as marks."""
     for frame in (report.results, report.cells):
         frame["params"] = frame["params"].replace("", AWKWARD)
     return report
-
-
-def made(report: Report, **options: object) -> paper.Sheet:
-    return paper.sheet(report.results, report.cells, **options)  # type: ignore[arg-type]
 
 
 def from_csv(text: str) -> list[list[str]]:
@@ -164,51 +161,3 @@ def run(report: Report, tmp_path: Path) -> Path:
 
 def test_tables_read_back_give_the_same_sheet(report: Report, run: Path) -> None:
     pd.testing.assert_frame_equal(paper.sheet(*paper.read_run(run)).texts, made(report).texts)
-
-
-def matbench(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stop:
-        main(tokens)
-    said = capsys.readouterr()
-    return int(stop.value.code or 0), said.out, said.err
-
-
-def test_the_command_prints_or_writes(run: Path, report: Report, capsys: pytest.CaptureFixture[str]) -> None:
-    assert matbench(capsys, "report", str(run), "--format", "md") == (0, paper.markdown(made(report)), "")
-    status, out, _ = matbench(capsys, "report", str(run))
-    assert status == 0
-    assert "10.51" in out
-    place = run / "t.csv"
-    line = ["report", str(run), "-o", str(place), "-m", "avg", "--region", "occ", "all", "--no-scenes"]
-    assert matbench(capsys, *line)[0] == 0
-    table = pd.read_csv(place)
-    assert list(table.columns) == ["scene", "method", "occ", "all", "mean rank", "metric", "unit", "note"]
-    assert set(table.scene) == {"mean"}
-    scope = tables.shared(report.results, report.cells)
-    expected = tables.means(report.results, scope, "occ", "avg")["good"]
-    assert np.isclose(table.occ[0], round(expected, 2))
-
-
-@pytest.mark.parametrize(
-    ("tokens", "said"),
-    [
-        (["--format", "doc"], "doc"),
-        (["-o", "t.doc"], "must end in .tex, .md or .csv"),
-        (["-o", "/no/such/t.md"], "folder '/no/such' of --out does not exist"),
-        (["-m", "total_bad_3"], "unknown metric 'total_bad_3' of this run: did you mean 'total_bad_1'?"),
-        (["--region", "ocd"], "unknown region 'ocd' of total_bad_1 in this run: did you mean 'occ'?"),
-    ],
-)
-def test_wrong_usage_is_one_line(run: Path, capsys: pytest.CaptureFixture[str], tokens: list[str], said: str) -> None:
-    status, out, err = matbench(capsys, "report", str(run), *tokens)
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert said in err
-
-
-def test_a_folder_that_is_no_finished_run(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "cannot be read" in matbench(capsys, "report", str(run / "none"))[2]
-    (run / "results.csv").write_text("a,b\n1,2\n")
-    assert "is damaged" in matbench(capsys, "report", str(run))[2]
-    (run / "results.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(UserError, match="is damaged"):
-        paper.read_run(run)

@@ -123,3 +123,9 @@ def test_one_scene_in_many_guises_is_one_witness(report: Report) -> None:
     assert scope.distinct == len(scope.scenes) == 2
     guises = evolve(scope, scenes=tuple(f"made/one[noise={k}]" for k in range(8)))
     assert guises.distinct == 1
+
+
+def test_all_tables_at_once_are_those_made_alone(report: Report) -> None:
+    again = pd.concat([report.results, report.results.iloc[:40].assign(seed=1, value=np.nan)])
+    for (metric, region), table in tables.every_scene(again).items():
+        pd.testing.assert_frame_equal(table, tables.per_scene(again, region, metric), check_names=False)

@@ -65,3 +65,21 @@ def test_regions_over_all_views_have_a_table_of_their_own() -> None:
     assert max(map(len, text.splitlines())) <= 80
     assert "by the views" not in printed(80, *run_of("total_bad_1", values), "total_bad_1", False)
     assert list(tables.summary(*run).columns[:9]) == [f"total_bad_1 {r}" for r in (*REGIONS, *tables.VIEWS)]
+
+
+def test_cells_that_fail_alike_share_a_row() -> None:
+    names = ["algorithm", "params", "scene", "seed", "status", "seconds", "peak_mb", "reason"]
+    rows = [
+        ("raises", "", f"synthetic/s{k}", 0, "failed", None, None, f"no digits (log: cells/{k:016x}/log.txt)")
+        for k in range(9)
+    ]
+    cells = pd.DataFrame([*rows, ("slow", "", "synthetic/s1", 0, "timeout", None, None, "")], columns=names)
+    results = pd.DataFrame(columns=["algorithm", "params", "scene", "region", "metric", "value", "unit"])
+    console = Console(width=80, file=io.StringIO(), record=True)
+    console.print(terminal.tables(results, cells)[-1])
+    text = console.export_text()
+    assert "10 cells without a score" in text
+    assert "and 6 more" in text
+    assert text.count("no digits") == 1
+    assert "cells/0000000000000000/log.txt" in "".join(text.split()), "that of the first"
+    assert "timeout" in text

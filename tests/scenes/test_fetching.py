@@ -19,14 +19,23 @@ from matbench.errors import UserError
 from matbench.files.images import has_pixels, pixel_digests
 from matbench.files.transfer import Patience
 from matbench.scenes.dataset import Download, Remote
-from matbench.scenes.downloads import downloads
 from matbench.scenes.fetching import Result, fetch, look, site_of
 
 QUICK = Patience(timeout=20, retries=1, pause=0.01)
+
+
 SHORT = Patience(timeout=0.5, retries=1, pause=0.01)
+
+
 FOLDER = PurePosixPath("toys/small/box")
+
+
 NAMES = ("im0.ppm", "im1.ppm", "im2.ppm", "disp1.pgm")
+
+
 rng = np.random.default_rng(3)
+
+
 PIXELS = {name: rng.integers(0, 256, (30, 40, 3) if name.endswith("ppm") else (30, 40), np.uint8) for name in NAMES}
 
 
@@ -37,6 +46,8 @@ def encoded(name: str, pixels: np.ndarray) -> bytes:
 
 
 PICTURES = {name: encoded(name, pixels) for name, pixels in PIXELS.items()}
+
+
 OTHER = encoded("im0.ppm", np.zeros((30, 40, 3), np.uint8))
 
 
@@ -343,46 +354,3 @@ def test_what_is_no_mirror_is_refused(mirror: str) -> None:
     with pytest.raises(UserError, match=r"no address: write http://HOST/PATH/"):
         site_of(mirror)
     assert site_of("http://localhost:8000/x") == "http://localhost:8000/x/"
-
-
-@pytest.mark.parametrize(
-    ("selectors", "names", "left_out"),
-    [
-        ("paper", ["middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy"], []),
-        (["middlebury2003/teddy[size=half]"], ["middlebury2003/teddy[size=half]"], []),
-        (["middlebury2003/teddy[size=quarter,half]"], ["middlebury2003/teddy", "middlebury2003/teddy[size=half]"], []),
-        (["middlebury2003/*", "middlebury2003/teddy"], ["middlebury2003/cones", "middlebury2003/teddy"], []),
-        ("paper[size=half]", ["middlebury2006/Rocks1[size=half]", "middlebury2003/teddy[size=half]"], ["tsukuba"]),
-        (
-            "middlebury2005/D*[size=full]",
-            ["middlebury2005/Dolls[size=full]", "middlebury2005/Dwarves"],
-            ["Drumsticks"],
-        ),
-    ],
-)
-def test_selectors(selectors, names: list[str], left_out: list[str]) -> None:
-    chosen, others = downloads(selectors)
-    assert [one.name for one in chosen] == names
-    assert all(name in said for name, said in zip(left_out, others, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("selector", "said"),
-    [
-        ("middlebury2006/aloe", "unknown scene 'middlebury2006/aloe': did you mean 'middlebury2006/Aloe'?"),
-        ("middelbury2006/*", "no scene that can be fetched is called 'middelbury2006/*'"),
-        ("middelbury2006/Aloe", "unknown dataset 'middelbury2006': did you mean 'middlebury2006'?"),
-        ("middlebury2006/Aloe[size=full]", "size full is not known, known: third, half"),
-        ("middlebury2001/*[size=half]", "size half is not known"),
-        ("middlebury2005/Drumsticks", "none of its files is known"),
-        ("middlebury2006/Aloe[views=0:3]", "unknown option 'views' of fetch"),
-        ("synthetic/box", "the scenes of synthetic are not downloaded"),
-        ("teddy", "scene 'teddy' has no dataset"),
-        ("middlebury2006/[", "cannot read"),
-    ],
-)
-def test_what_cannot_be_fetched_is_refused_in_one_line(selector: str, said: str) -> None:
-    with pytest.raises(UserError) as caught:
-        downloads(selector)
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)

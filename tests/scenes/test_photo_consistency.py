@@ -21,40 +21,6 @@ def _scene(n: int = 5, near: float = 6.0, far: float = 2.0, pair_steps: float = 
     return Scene("layers", views, labels, ref, Range(far - 1, near + 1), {ref: world.truth()}, pair_steps)
 
 
-def _cubic(row: np.ndarray, at: float) -> np.ndarray:
-    """Keys' cubic through four neighbours, a = -0.75, ends repeated."""
-
-    def weight(t: float) -> float:
-        t, a = abs(t), -0.75
-        return (
-            (a + 2) * t**3 - (a + 3) * t**2 + 1
-            if t <= 1
-            else a * t**3 - 5 * a * t**2 + 8 * a * t - 4 * a
-            if t < 2
-            else 0
-        )
-
-    first = int(np.floor(at)) - 1
-    return sum(row[np.clip(k, 0, len(row) - 1)].astype(float) * weight(at - k) for k in range(first, first + 4))
-
-
-def test_warping_is_sampling_along_the_row() -> None:
-    rng = np.random.default_rng(0)
-    image = rng.integers(0, 256, (4, 30, 3), np.uint8)
-    disparity = rng.uniform(-3, 3, (4, 30)).astype(np.float32)
-    disparity = (np.rint(disparity * 16) / 16).astype(np.float32)
-    disparity[1, 5] = np.nan
-    for steps in (-2, 1):
-        found = warped(image, disparity, steps)
-        for y in range(4):
-            for x in range(30):
-                at = x - steps * disparity[y, x]
-                if np.isnan(at) or not 0 <= at <= 29:
-                    assert np.isnan(found[y, x]).all()
-                else:
-                    np.testing.assert_allclose(found[y, x], _cubic(image[y], at), atol=0.05)
-
-
 def test_errors_are_the_mean_and_median_over_seen_pixels() -> None:
     scene = _scene()
     truth, shifts = scene.truth[2], (-1.0, 0.0, 1.0)

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from matbench import UserError, load_scene
+from matbench import load_scene
+from matbench.errors import UserError
 from matbench.scenes import views_only
 
 
@@ -34,3 +35,9 @@ def test_a_process_that_runs_methods_loads_views_only(monkeypatch: pytest.Monkey
     assert not seen.truth
     with pytest.raises(UserError, match="unknown scene 'bxo' of synthetic"):
         load_scene("synthetic/bxo")
+
+
+def test_a_reader_that_cannot_even_speak_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    with pytest.raises(UserError, match="reading synthetic/box ended with status 1"):
+        views_only.from_another_process("synthetic/box", None)

@@ -1,13 +1,10 @@
 """The same plan on a Dask cluster of several processes, one of which dies and one of which comes late."""
 
-import shutil
 import subprocess
 import sys
 import threading
-import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
 
@@ -20,12 +17,13 @@ from scene_files import Layers, pfm_bytes, write_png
 
 from matbench import comparison
 from matbench.errors import UserError
-from matbench.files.unzip import ArchiveError
 from matbench.plans.settings import Settings
-from matbench.runs import parcels, provenance
+from matbench.runs import provenance
 from matbench.solving import cluster, run
 
 MATCHER = PROGRAMS / "block_matcher.py"
+
+
 SMALL = "synthetic/box[size=96x72]"
 
 
@@ -179,43 +177,3 @@ def test_a_cluster_that_cannot_be_had(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(UserError, match=r"pip install 'matbench-stereo\[cluster\]'"):
         ready.run()
-
-
-def test_what_comes_back_is_checked(tmp_path: Path) -> None:
-    ready = prepare(tmp_path / "run", "flat", "noise")
-    ready.run()
-    store, (cell, other) = ready.store, ready.plan.cells
-    whole = parcels.pack(store.cell(cell))
-    before = (store.cell(other) / "cell.json").read_bytes()
-    shutil.rmtree(store.cell(cell))
-    for _ in range(2):  # a cell may come twice
-        assert parcels.put(store, cell, whole).status == "ok"
-
-    def parcel(**files: bytes) -> bytes:
-        packed = BytesIO()
-        with zipfile.ZipFile(packed, "w") as archive:
-            for name, content in files.items():
-                archive.writestr(name, content)
-        return packed.getvalue()
-
-    facts, maps = ((store.cell(cell) / name).read_bytes() for name in ("cell.json", "disparity.npz"))
-    hostile = {
-        "junk": b"junk",
-        "nothing": parcel(),
-        "half": whole[: len(whole) // 2],
-        "another cell": parcels.pack(store.cell(other)),
-        "no maps": parcel(**{"cell.json": facts}),
-        "damaged maps": parcel(**{"cell.json": facts, "disparity.npz": maps[:99]}),
-        "no facts": parcel(**{"cell.json": b"[]", "disparity.npz": maps}),
-        "a folder": parcel(**{"cell.json": facts, "disparity.npz": maps, "sub/log.txt": b"x"}),
-        "a bomb": parcel(**{"cell.json": facts, "disparity.npz": maps, "log.txt": b"x" * (2 << 20)}),
-    }
-    for name, sent in hostile.items():
-        with pytest.raises(ArchiveError):
-            parcels.put(store, cell, sent)
-        assert store.outcome(cell) is not None, name
-    outside = {"cell.json": facts, "disparity.npz": maps, "../../evil": b"x", "/evil": b"x", "evil.py": b"x"}
-    parcels.put(store, cell, parcel(**outside))
-    assert {p.name for p in store.cell(cell).iterdir()} == {"cell.json", "disparity.npz"}
-    assert (store.cell(other) / "cell.json").read_bytes() == before
-    assert {p.name for p in (tmp_path / "run" / "cells").iterdir()} == {cell.key, other.key}

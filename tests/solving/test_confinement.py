@@ -5,8 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from forking import beside
 
 from matbench.solving import confinement
+from matbench.solving.confinement import SHARED_MEMORY, shared_memory_mb, shut_in
 
 if not confinement.is_possible():
     pytest.skip("this system lets nobody mount in a namespace of their own", allow_module_level=True)
@@ -66,3 +68,28 @@ def test_shared_memory_is_its_own_and_bounded(tmp_path: Path) -> None:
 
     assert in_a_process(is_bounded)
     assert not name.exists()
+
+
+def refused(act) -> str:
+    try:
+        act()
+    except OSError as error:
+        return error.strerror or ""
+    return "it worked"
+
+
+def test_shared_memory_is_its_own_bounded_and_counted(tmp_path: Path) -> None:
+    name = Path(SHARED_MEMORY) / f"matbench-test-{os.getpid()}"
+
+    def inside() -> str:
+        assert shut_in(tmp_path, 2)
+        assert not list(Path(SHARED_MEMORY).iterdir())
+        name.write_bytes(bytes(1 << 20))
+        return refused(lambda: name.with_suffix(".more").write_bytes(bytes(4 << 20)))
+
+    with beside(inside) as (pid, said):
+        assert said == "No space left on device"
+        assert not name.exists(), "nobody else sees it"
+        assert shared_memory_mb(pid) == pytest.approx(2, abs=0.1)
+    assert shared_memory_mb(pid) is None, "it has gone with its process"
+    assert shared_memory_mb(os.getpid()) is None, "this process shares everybody's"

@@ -71,3 +71,16 @@ def test_seconds_are_believed_where_two_clocks_agree(inside: float, outside: flo
     found = intake.corrected(Outcome("ok", inside), outside)
     assert found.seconds == believed
     assert bool(found.doubt) == (inside != believed)
+
+
+def test_a_file_is_copied_and_not_moved(tmp_path: Path) -> None:
+    source, target = tmp_path / "log.txt", tmp_path / "taken"
+    content = np.random.default_rng(0).bytes((1 << 20) + 17)
+    source.write_bytes(content)
+    with source.open("r+b") as held:  # by whoever made it
+        assert intake.take(source, target)
+        held.write(b"changed later")
+    assert target.read_bytes() == content
+    assert not intake.take(tmp_path / "none", tmp_path / "other")
+    with pytest.raises(FileExistsError):
+        intake.take(source, target)

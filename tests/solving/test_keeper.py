@@ -1,92 +1,16 @@
-"""Whatever a method does to its process costs its cell alone; limits are enforced from outside."""
+"""Keepers of processes: those that are killed are replaced, and processes are shared among cells."""
 
-import os
-import re
-import subprocess
-import sys
-import time
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
-import psutil
-import pytest
 from attrs import evolve
+from misbehaviour import EXPECTED, SMALL
 from places import METHODS, ROUGH
 
 from matbench import comparison
-from matbench.errors import UserError
-from matbench.plans import limits
 from matbench.plans.settings import Settings
 from matbench.solving.environment import without_main
 from matbench.solving.keeper import Keeper, dismiss
 from matbench.solving.worker import Job
-
-SMALL = "synthetic/box[size=96x72]"
-
-
-def run(folder: Path, *algorithms: str, **settings: object) -> pd.DataFrame:
-    ready = comparison.prepare(
-        list(algorithms), SMALL, out=folder, plugin=[ROUGH, METHODS], settings=Settings(**settings)
-    )
-    ready.run()
-    cells = ready.tables().cells.set_index("algorithm")
-    cells["log"] = [(folder / "cells" / key / "log.txt").read_text(errors="replace") for key in cells.cell]
-    assert not list((folder / "cells").glob(".*")), "no drafts"
-    return cells
-
-
-def below(pid: int | None = None) -> set[int]:
-    """Processes below this one whose end is not merely unnoticed."""
-    found = psutil.Process(pid).children(recursive=True)
-    return {p.pid for p in found if p.is_running() and p.status() != psutil.STATUS_ZOMBIE}
-
-
-EXPECTED = {
-    "segfaults": ("crashed", "segmentation fault, SIGSEGV", "Fatal Python error: Segmentation fault"),
-    "aborts": ("crashed", "SIGABRT", "in misbehave"),
-    "exits": ("crashed", "exit status 7", ""),
-    "leaves": ("failed", "SystemExit", ""),
-    "overflows": ("crashed", "segmentation fault", "in deeper"),
-    "loops": ("timeout", "stopped after 5 s", "in misbehave"),
-    "allocates": ("out-of-memory", "MemoryError: Unable to allocate 1.00 TiB", "in misbehave"),
-    "grows": ("out-of-memory", "400 MiB are its limit", "Grows begins"),
-    "chatters": ("ok", "", "the last line, from C"),
-    "upsets": ("ok", "", "Upsets begins"),
-    "breeds": ("ok", "", "Breeds begins"),
-    "scribbles": ("crashed", "wrote into a file of the harness", "Scribbles begins"),
-    "splits": ("ok", "", "Splits begins"),
-    "interrupts": ("interrupted", "KeyboardInterrupt", "in misbehave"),
-    "tampers": ("failed", "the method wrote into its input", "Tampers begins"),
-    "writes": ("failed", "read-only", "in solve"),
-    "bare": ("failed", "ndarray, not an Estimate", ""),
-    "orphans": ("crashed", "its keeper was killed", ""),
-    "flat": ("ok", "", ""),
-}
-
-
-@pytest.mark.parametrize("isolation", ["process", "shared"])
-def test_whatever_a_method_does_costs_its_cell_alone(tmp_path: Path, isolation: str) -> None:
-    names = [name for name in EXPECTED if name not in ("orphans", "loops")]
-    found = run(tmp_path / "run", *names, timeout=120, memory=400, isolation=isolation)
-    for name in names:
-        status, reason, printed = EXPECTED[name]
-        assert found.status[name] == status, (name, found.reason[name], found.log[name][-2000:])
-        assert reason in found.reason[name]
-        assert printed in found.log[name], (name, found.log[name][-2000:])
-    assert len(found.log["chatters"]) < 200_000
-    assert re.search(r"\d+ bytes left out", found.log["chatters"])
-    assert "line 31" in found.log["chatters"]
-    assert not found.log["flat"]
-    assert {"sleep"}.isdisjoint(psutil.Process(pid).name() for pid in below()), "what methods leave behind is ended"
-
-
-def test_an_endless_loop_is_stopped(tmp_path: Path) -> None:
-    found = run(tmp_path / "run", "loops", timeout=5)
-    status, reason, printed = EXPECTED["loops"]
-    log = f"(log: cells/{found.cell['loops']}/log.txt)"
-    assert (found.status["loops"], found.reason["loops"]) == (status, f"{reason} {log}")
-    assert printed in found.log["loops"]
 
 
 def test_a_keeper_that_is_killed_is_replaced(tmp_path: Path) -> None:
@@ -138,101 +62,3 @@ def test_a_keeper_shares_a_process_among_cells_that_want_the_same(tmp_path: Path
     dismiss([keeper])
     assert pids[0] == pids[1]
     assert len(set(pids)) == 3
-
-
-def test_processes_threads_and_marks(tmp_path: Path) -> None:
-    names = [f"tells[mark={mark}]" for mark in range(4)]
-
-    def look(folder: str, **settings: object) -> tuple[list[float], pd.DataFrame]:
-        ready = comparison.prepare(
-            names, SMALL, out=tmp_path / folder, plugin=[ROUGH, METHODS], settings=Settings(**settings)
-        )
-        ready.run()
-        scene = next(iter(ready.scenes.values()))
-        maps = [ready.store.disparity(cell)[scene.ref] for cell in ready.plan.cells]
-        return [float(np.unique(one).item()) for one in maps], ready.tables().cells
-
-    processes, cells = look("alone", threads=1)
-    assert len(set(processes)) == 4, "one process a cell"
-    assert cells.alone.all()
-    assert (cells.threads == 1).all()
-    log = (tmp_path / "alone" / "cells" / cells.cell[0] / "log.txt").read_text()
-    assert log.startswith("threads 1 1 1 1 1 True"), log
-
-    processes, cells = look("shared", isolation="shared", threads=2)
-    assert len(set(processes)) == 1, "one process for all"
-    log = (tmp_path / "shared" / "cells" / cells.cell[3] / "log.txt").read_text()
-    assert log.split()[1:6:4] == ["2", "2"], log
-
-    processes, cells = look("many", jobs=4)
-    assert len(set(processes)) == 4
-    assert not cells.alone.any(), "others ran meanwhile"
-    assert (cells.threads == max(1, limits.cores() // 4)).all()
-
-
-def _start(folder: Path, *more: str) -> subprocess.Popen[str]:
-    line = [sys.executable, "-m", "matbench", "compare", "-a", "breeds", "loops", "tells[wait=3600]", "-s", SMALL]
-    line += ["--plugin", str(ROUGH), "--out", str(folder), "--jobs", "3", *more]
-    pipe = subprocess.PIPE
-    process = subprocess.Popen(line, stdout=pipe, stderr=subprocess.STDOUT, text=True, start_new_session=True)
-    end = time.monotonic() + 120
-    while len(list(folder.glob("cells/.*"))) != 2 or not list(folder.glob("cells/[0-9a-f]*")):
-        assert process.poll() is None, process.communicate()[0]
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.05)
-    time.sleep(1)
-    return process
-
-
-def test_nothing_outlives_a_run(tmp_path: Path) -> None:
-    process = _start(tmp_path / "run")
-    children = psutil.Process(process.pid).children(recursive=True)
-    assert len(children) >= 5, "a server, keepers, methods"
-    process.kill()
-    process.wait()
-    assert not psutil.wait_procs(children, timeout=60)[1]
-    end = time.monotonic() + 60
-    while list((tmp_path / "run" / "cells").glob(".*")):
-        assert time.monotonic() < end, "drafts are left"
-        time.sleep(0.05)
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("--timeout 0", "timeout '0' is not a positive number of seconds, such as 600, or none"),
-        ("--timeout=-1", "timeout '-1' is not a positive"),
-        ("--timeout x", "timeout 'x' is not a positive"),
-        ("--timeout nan", "timeout 'nan' is not a positive"),
-        ("--memory '3 bananas'", "memory '3 bananas' is not an amount such as 512 (MiB), 512M or 4G"),
-        ("--memory 0", "memory '0' is not an amount"),
-        ("--jobs 0", "jobs '0' is not a whole number from 1 to 256"),
-        ("--threads 1000", "threads '1000' is not a whole number from 1 to 256"),
-        ("--isolation none", "isolation 'none' is not process or shared"),
-    ],
-)
-def test_limits_that_make_no_sense_are_refused(
-    line: str, said: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import shlex
-
-    from matbench.cli import main
-
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["compare", "-a", "sgbm", "-s", SMALL, *shlex.split(line)])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err.startswith(f"matbench: {said}")
-    assert not list(tmp_path.iterdir())
-
-
-def test_limits_as_people_write_them() -> None:
-    assert limits.mebibytes("4G") == limits.mebibytes("4 GiB") == limits.mebibytes(4096) == 4096
-    assert limits.mebibytes("1.5g") == 1536
-    assert limits.seconds("0.5") == 0.5
-    assert limits.seconds("none") is None
-    with pytest.raises(UserError, match="jobs"):
-        Settings(jobs=2.5)  # type: ignore[arg-type]
-    assert limits.crowded(limits.cores(), 1) == ""
-    assert f"share {limits.cores()} cores" in limits.crowded(limits.cores(), 2)
-    assert os.cpu_count()

@@ -2,14 +2,19 @@
 
 import mmap
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from forking import in_child
 
 from matbench.solving import memory
+
+MIB = 1 << 20
+
 
 _HOLDS = """
 import mmap, os, sys, time
@@ -80,3 +85,17 @@ def test_fresh_memory_holds_what_it_is_filled_with() -> None:
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert found.stdout.strip() == "{65}"
     assert np.frombuffer(b"A" * 4, np.float32)[0] == pytest.approx(12.078431)
+
+
+def test_a_runaway_allocation_fails_where_it_happens() -> None:
+    def limited() -> list[object]:
+        memory.confine(100)
+        np.ones(50 * MIB, np.uint8)
+        try:
+            np.ones(2000 * MIB, np.uint8)
+        except MemoryError as error:
+            said = type(error).__name__
+        return [said, resource.getrlimit(resource.RLIMIT_CORE)[1], Path("/proc/self/oom_score_adj").read_text().strip()]
+
+    assert in_child(limited)[:2] == ["MemoryError", 0]
+    assert np.ones(500 * MIB, np.uint8)[-1] == 1, "this process is as free as before"

@@ -4,19 +4,28 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
+import psutil
 import pytest
-from places import METHODS
+from places import METHODS, ROUGH
 
 from matbench import comparison
+from matbench.plans import limits
 from matbench.plans.settings import Settings
 from matbench.rescoring import open_run
 from matbench.runs.outcome import Outcome
 from matbench.runs.todo import explained
 from matbench.solving import confinement
 
+SMALL = "synthetic/box[size=96x72]"
+
+
 SCENE = "synthetic/box[size=48x36]"
+
 
 REACHES = '''
 import json
@@ -115,3 +124,60 @@ def test_a_doubtful_cell_is_due_again_only_if_asked_for(tmp_path: Path) -> None:
     assert again.pending().cells == (cell,)
     ((_, why),) = explained(again.plan, again.store, again.settings)
     assert why == "its seconds are in doubt: others took 1 processor seconds of 1 s"
+
+
+def test_processes_threads_and_marks(tmp_path: Path) -> None:
+    names = [f"tells[mark={mark}]" for mark in range(4)]
+
+    def look(folder: str, **settings: object) -> tuple[list[float], pd.DataFrame]:
+        ready = comparison.prepare(
+            names, SMALL, out=tmp_path / folder, plugin=[ROUGH, METHODS], settings=Settings(**settings)
+        )
+        ready.run()
+        scene = next(iter(ready.scenes.values()))
+        maps = [ready.store.disparity(cell)[scene.ref] for cell in ready.plan.cells]
+        return [float(np.unique(one).item()) for one in maps], ready.tables().cells
+
+    processes, cells = look("alone", threads=1)
+    assert len(set(processes)) == 4, "one process a cell"
+    assert cells.alone.all()
+    assert (cells.threads == 1).all()
+    log = (tmp_path / "alone" / "cells" / cells.cell[0] / "log.txt").read_text()
+    assert log.startswith("threads 1 1 1 1 1 True"), log
+
+    processes, cells = look("shared", isolation="shared", threads=2)
+    assert len(set(processes)) == 1, "one process for all"
+    log = (tmp_path / "shared" / "cells" / cells.cell[3] / "log.txt").read_text()
+    assert log.split()[1:6:4] == ["2", "2"], log
+
+    processes, cells = look("many", jobs=4)
+    assert len(set(processes)) == 4
+    assert not cells.alone.any(), "others ran meanwhile"
+    assert (cells.threads == max(1, limits.cores() // 4)).all()
+
+
+def _start(folder: Path, *more: str) -> subprocess.Popen[str]:
+    line = [sys.executable, "-m", "matbench", "compare", "-a", "breeds", "loops", "tells[wait=3600]", "-s", SMALL]
+    line += ["--plugin", str(ROUGH), "--out", str(folder), "--jobs", "3", *more]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(line, stdout=pipe, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+    end = time.monotonic() + 120
+    while len(list(folder.glob("cells/.*"))) != 2 or not list(folder.glob("cells/[0-9a-f]*")):
+        assert process.poll() is None, process.communicate()[0]
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.05)
+    time.sleep(1)
+    return process
+
+
+def test_nothing_outlives_a_run(tmp_path: Path) -> None:
+    process = _start(tmp_path / "run")
+    children = psutil.Process(process.pid).children(recursive=True)
+    assert len(children) >= 5, "a server, keepers, methods"
+    process.kill()
+    process.wait()
+    assert not psutil.wait_procs(children, timeout=60)[1]
+    end = time.monotonic() + 60
+    while list((tmp_path / "run" / "cells").glob(".*")):
+        assert time.monotonic() < end, "drafts are left"
+        time.sleep(0.05)
