@@ -102,3 +102,30 @@ def test_what_changes_decides_what_is_done_again(tmp_path: Path, monkeypatch: py
     finally:
         monkeypatch.undo()
         forget()
+
+
+def test_one_changed_scene_file_is_that_scene_s_cells_only(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        layers = Layers(width=48, height=32, seed=len(name))
+        (tmp_path / name).mkdir()
+        for view in range(3):
+            write_png(tmp_path / name / f"v{view}.png", layers.view(view - 1))
+        write_png(tmp_path / name / "truth.png", np.round((layers.truth() + 2) * 16).astype(np.uint8))
+        (tmp_path / name / "scene.toml").write_text(
+            'views = ["v0.png", "v1.png", "v2.png"]\ndisparities = [-2, 3]\nreference = "v1.png"\npair_steps = 1\n'
+            '[truth."v1.png"]\nfile = "truth.png"\nscale = 16\nunknown = 0\n'
+        )
+    scenes, run = [str(tmp_path / name) for name in ("one", "two")], tmp_path / "run"
+    ready = comparison.prepare(["sgbm", "okutomi_kanade"], scenes, out=run)
+    ready.run()
+    stamps = {path: path.stat().st_mtime_ns for path in run.glob("cells/*/cell.json")}
+    assert len(stamps) == 4
+    picture = Layers(width=48, height=32, seed=3).view(1)
+    picture[5, 5] ^= 255
+    write_png(tmp_path / "two" / "v2.png", picture)
+    again = comparison.prepare(["sgbm", "okutomi_kanade"], scenes, out=run)
+    due = again.pending().cells
+    assert [str(cell).endswith("/two") for cell in due] == [True, True]
+    again.run()
+    assert {path: path.stat().st_mtime_ns for path in stamps if path.exists()} == stamps
+    assert len(list(run.glob("cells/*/cell.json"))) == 6
