@@ -28,7 +28,7 @@ def test_truth_beyond_a_range_is_told_once_for_each_scene(tmp_path: Path) -> Non
     (remark,) = ready.remarks
     assert remark.startswith(f"{scene.name}: {beyond} of {scene.height * scene.width} pixels")
     ready.run()
-    assert remark in ready.report(*ready.tables()).read_text("utf-8")
+    assert remark in ready.report(ready.tables()).read_text("utf-8")
 
 
 def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
