@@ -22,7 +22,6 @@ def use_threads(count: int) -> None:
 
     for name in _THREAD_VARIABLES:
         os.environ[name] = str(count)
-    threadpoolctl.threadpool_limits(count)
     cv2.setNumThreads(count)
     if "numba" in sys.modules:
         import numba
@@ -31,6 +30,7 @@ def use_threads(count: int) -> None:
         numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     else:
         os.environ["NUMBA_NUM_THREADS"] = str(count)
+    threadpoolctl.threadpool_limits(count)  # last, as numba has just loaded OpenMP with all the threads it knows of
 
 
 def start_server(preload: Iterable[str]) -> None:

@@ -34,7 +34,7 @@ def test_what_a_method_tells_is_kept_and_it_has_no_truth(tmp_path: Path) -> None
     ready = comparison.prepare("tells", SMALL, out=tmp_path / "run", plugin=plugin)
     (cell,), scene = ready.plan.cells, ready.scenes[SMALL]
     found = solve_captured(cell, [plugin], scene, RecordOption(rows=(9,)))
-    assert found.probe.energies == {"total": [9.0, 8.0, 7.0]}
+    assert found.probe.energies == {"total": [(0, 9.0), (1, 8.0), (2, 7.0)]}
     assert [frame.step for frame in found.probe.frames] == [0, 1, 2]
     assert [int(frame.materiality.max()) for frame in found.probe.frames if frame.materiality is not None] == [
         0,

@@ -10,8 +10,7 @@ from matbench.algorithm import Estimate
 from matbench.scene import Range, Scene
 from matbench.solving import worker
 
-TRUTH = {1: np.ones((4, 6), np.float32)}
-SCENE = Scene("toy", np.full((3, 4, 6, 3), 7, np.uint8), ("a", "b", "c"), 1, Range(0, 2), TRUTH, 2.0)
+SCENE = Scene("toy", np.full((3, 4, 6, 3), 7, np.uint8), ("a", "b", "c"), 1, Range(0, 2), {}, 2.0)
 MAP = np.ones((4, 6))
 
 
