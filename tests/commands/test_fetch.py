@@ -224,7 +224,7 @@ def test_interrupted_from_the_keyboard(person: Person, site) -> None:
 def test_two_fetches_at_once_share_the_work(person: Person, site) -> None:
     site.files["zip/box.zip"] = ARCHIVES["box"]
     site.files["zip/ball.zip"] = ARCHIVES["ball"]
-    site.faults["zip/box.zip"] = [("slow", 100_000, 0.02)]
+    site.faults["zip/box.zip"] = [("slow", 100_000, 0.05)]
     part = person.root / "toys/box/.fetch/box.zip.part"
     first = person.start("toys/box", "toys/ball", "--data", "data")
     until(part.exists)
