@@ -2,6 +2,7 @@
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
@@ -71,6 +72,7 @@ for _name, _help in COMMANDS.items():
 
 def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0 all well, 1 something failed, 2 wrong usage, 3 a regression, 130 interrupted."""
+    warnings.formatwarning = _warning
     try:
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except UserError as error:
@@ -90,6 +92,12 @@ def main(tokens: Sequence[str] | None = None) -> None:
     except OSError as error:
         status = _refuse(f"{error.filename or 'output'}: {error.strerror}")
     sys.exit(status)
+
+
+def _warning(message: Warning | str, category: type[Warning], filename: str, lineno: int, _: str | None = None) -> str:
+    """A warning in one line; what the harness says to users goes without a line of its code."""
+    place = "" if category is UserWarning else f"{filename}:{lineno}: {category.__name__}: "
+    return f"matbench: {place}{message}\n"
 
 
 def _refuse(message: str) -> int:

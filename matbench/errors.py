@@ -12,6 +12,7 @@ _COLOURS = re.compile(r"\x1b\[[0-9;]*m")  # as compilers print them
 _HARNESS = Path(__file__).parent
 _METHODS = _HARNESS / "algorithms"
 _LIBRARIES = {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+_MOST = 2000  # characters of a message: tables and pages show it, the log has all of it
 _INSTALLED = {"site-packages", "dist-packages"}
 
 
@@ -45,7 +46,7 @@ def unknown(kind: str, value: str, possible: Iterable[str]) -> UserError:
 
 
 def one_line(error: BaseException) -> str:
-    """All that an exception says, in one line; its type where it says nothing.
+    """All that an exception says, in one line; its type where it says nothing. Of a very long one its two ends.
 
     It is ``str(error)``, not the first argument: that of an `OSError` is a number, that of a
     `UnicodeDecodeError` the name of a codec. Of a program that was called, the last line that it printed as an
@@ -64,7 +65,11 @@ def one_line(error: BaseException) -> str:
         printed = error.stderr if isinstance(error.stderr, str) else error.stderr.decode("utf-8", "replace")
         said += f" It printed: {(printed.splitlines() or [''])[-1]}"
     plain = "".join(c if c.isprintable() else " " for c in _COLOURS.sub("", said))
-    return " ".join(plain.split()) or type(error).__name__
+    words = " ".join(plain.split())
+    if len(words) > _MOST:
+        ends = words[: _MOST // 2], words[-_MOST // 2 :]
+        words = f" ... {len(words) - _MOST} characters left out ... ".join(ends)
+    return words or type(error).__name__
 
 
 def where(error: BaseException) -> str:

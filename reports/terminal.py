@@ -4,6 +4,8 @@ from collections.abc import Iterable
 
 import pandas as pd
 from rich import box
+from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -43,16 +45,18 @@ def tables(
 ) -> list[Table]:
     """The summary, its regions over all views, every scene, and the failed cells; empty tables are left out.
 
-    In a terminal of fewer than `WIDTH` columns the summary leaves out the regions of `NARROW`.
+    Where the summary does not fit the terminal it leaves out the regions of `NARROW`.
     """
     scope = shared(results, cells)
     out = []
     if scope.methods and len(results):
         heads = {f"{metric} {r}": r.replace("textureless", "texture-\nless") for r in REGIONS}
         heads |= {"avg all": "avg\nall", "seconds": f"{CLOCK}\ntime"}
-        if width < WIDTH:
+        by_region = _summary(results, cells, scope, metric, better, "by region", heads)
+        if width < WIDTH or _least_width(by_region) > width:
             heads = {column: head for column, head in heads.items() if column.split()[-1] not in NARROW}
-        out.append(_summary(results, cells, scope, metric, better, "by region", heads))
+            by_region = _summary(results, cells, scope, metric, better, "by region", heads)
+        out.append(by_region)
         over_views = [r for r in summarised(results) if r in VIEWS]
         if per_scene(results, VIEWS[0], metric).notna().any(axis=None):
             heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in over_views}
@@ -68,6 +72,12 @@ def tables(
 
 def _plain(title: str) -> Table:
     return Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+
+
+def _least_width(table: Table) -> int:
+    """The columns of a terminal below which numbers of a table are cut off."""
+    unbounded = Console(width=1000)
+    return Measurement.get(unbounded, unbounded.options, table).minimum
 
 
 def _number(value: float, unit: str, place: int, is_aside: bool = False) -> Text:

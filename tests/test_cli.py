@@ -46,3 +46,14 @@ def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> N
     status, out, _ = run(capsys, "--version")
     assert status == 0
     assert re.fullmatch(r"\d+\.\d+\.\d+", out.strip())
+
+
+def test_a_metric_that_fails_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "judge.py").write_text(
+        "from matbench import Metric\n"
+        "def broken(errors):\n    raise ValueError('no such table')\n"
+        "METRICS = [Metric('broken', '%', 'lower', 'always fails', broken)]\n"
+    )
+    line = f"{sys.executable} -m matbench compare --plugin judge.py -a sgbm -s 'synthetic/box[size=48x36]' -m broken -q"
+    done = subprocess.run(["bash", "-c", line], cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert done.stderr.splitlines() == ["matbench: metric broken failed: ValueError: no such table (judge.py:3)"]

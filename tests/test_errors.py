@@ -83,6 +83,14 @@ def test_a_message_that_cannot_be_had_is_told_as_such(error: BaseException) -> N
     assert failure(error).startswith(type(error).__name__)
 
 
+def test_a_very_long_message_keeps_its_two_ends() -> None:
+    said = one_line(ValueError("it began " + "x" * 10_000_000 + " it ended"))
+    assert said.startswith("it began x")
+    assert said.endswith("x it ended")
+    assert " 9998018 characters left out " in said
+    assert len(said) < 2100
+
+
 def test_a_users_error_says_enough() -> None:
     assert failure(UserError("size=3 of synthetic/box: 32 is possible")) == "size=3 of synthetic/box: 32 is possible"
 

@@ -56,6 +56,15 @@ def test_a_narrow_terminal_keeps_methods_and_times() -> None:
     assert "disc" not in narrow
 
 
+def test_no_number_is_cut_off_where_numbers_are_wide() -> None:
+    results, cells = run_of("bad_1", {f"method_{number}": 100.0 for number in range(12)})
+    results.loc[results["metric"] == "avg", "value"] = 5.7e36
+    cells["doubt"] = "others took 1.2 processor seconds of 0.9 s"
+    for width in (80, 100):
+        lines = printed(width, results, cells, "bad_1").splitlines()
+        assert sum("5.7e+36" in line and line.rstrip().endswith("1.25*") for line in lines) == 12, width
+
+
 def test_regions_over_all_views_have_a_table_of_their_own() -> None:
     values = {"materiality": 1.5, "okutomi_kanade": 2.5}
     run = run_of("total_bad_1", values, (*REGIONS, *tables.VIEWS))
