@@ -18,7 +18,7 @@ app = App(
     help_epilogue="""\
 **Examples**
 
-`matbench compare`  all built-in methods on the built-in scenes
+`matbench compare`  all built-in methods on three synthetic scenes and the paper's three
 
 `matbench compare -a sgbm -a 'materiality[views=4,5]' -s 'middlebury2006/*' --data DATA`
 
@@ -72,7 +72,7 @@ for _name, _help in COMMANDS.items():
 
 def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0 all well, 1 something failed, 2 wrong usage, 3 a regression, 130 interrupted."""
-    warnings.formatwarning = _warning
+    warnings.formatwarning = _warning  # type: ignore[assignment]  # its last parameter has another name
     try:
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except UserError as error:
