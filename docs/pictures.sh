@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 runs=$(mktemp -d)
 trap 'rm -rf "$runs"; kill "${viewer:-}" 2>/dev/null || true' EXIT
 
-matbench compare -a materiality multiview_sgm okutomi_kanade sgbm -s 'synthetic/*[size=160x120]' --out "$runs/synthetic"
+matbench compare -a materiality multiview_sgm okutomi_kanade sgbm -s 'synthetic/*[size=160x120]' --steady --out "$runs/synthetic"
 matbench compare -a 'materiality[preset=descent passes=20]' -s synthetic/spheres --record --out "$runs/recording"
 python docs/screenshot.py "file://$runs/synthetic/report.html" docs/images/report.png
 

@@ -18,7 +18,7 @@ app = App(
     help_epilogue="""\
 **Examples**
 
-`matbench compare`  all built-in methods on the built-in scenes
+`matbench compare`  all built-in methods on three synthetic scenes and the paper's three
 
 `matbench compare -a sgbm -a 'materiality[views=4,5]' -s 'middlebury2006/*' --data DATA`
 

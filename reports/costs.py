@@ -46,8 +46,8 @@ def timing_note(cells: pd.DataFrame) -> str:
     if alike == ok:
         return ""
     return (
-        f"{CLOCK} time: of {alike} of {ok} cells it can be compared; the others ran on another machine, not alone or "
-        "disturbed, and methods with such cells (*) are not ranked by it"
+        f"{CLOCK} time: {alike} of {ok} cells can be compared; the others ran on another machine, beside other cells, "
+        "or while other programs took the processors. Methods with such cells (*) are not ranked by it"
     )
 
 

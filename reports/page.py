@@ -72,7 +72,7 @@ def render(report: Report) -> str:
         if numbers.units
         else [],
         costs={name: COSTS[name] for name in numbers.costs},
-        timing=costs.timing_note(report.cells),
+        timing=costs.timing_note(report.cells).replace(" (*)", ""),  # the page says it in words
         clock=costs.CLOCK,
         silences=tables.silences(report.results, scope),
         enough=ENOUGH,

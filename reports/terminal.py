@@ -71,7 +71,9 @@ def tables(
 
 
 def _plain(title: str) -> Table:
-    return Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.padding = (0, 1, 0, 0)  # with the box's own column two blanks, so that methods' names fit, too
+    return table
 
 
 def _least_width(table: Table) -> int:

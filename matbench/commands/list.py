@@ -150,7 +150,8 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         if "error" in facts:
             scenes.add_row(escape(name), "", f"[red]{escape(facts['error'])}[/]", "no", "no")
             continue
-        sizes = ", ".join(f"{size} {w}x{h}" if w else size for size, (w, h) in facts["sizes"].items())
+        dims = {size: f"{w}x{h}" if w else "" for size, (w, h) in facts["sizes"].items()}
+        sizes = ", ".join(" ".join(dict.fromkeys((size, wide))).strip() for size, wide in dims.items())
         truth, present = ("yes" if facts[key] else "no" for key in ("truth", "present"))
         scenes.add_row(escape(name), str(facts["views"]), sizes, truth, present)
     metrics = Table("metric", "unit", "better", "about", title="Metrics", title_justify="left")

@@ -10,7 +10,6 @@ from cyclopts import Parameter
 
 from matbench.errors import UserError
 from matbench.plans import limits
-from matbench.plans.plugins import using
 from matbench.plans.settings import Only, Settings
 
 Data = Annotated[
@@ -47,7 +46,9 @@ class Options:
         ),
     ] = field(factory=lambda: ["0"])
     plugin: Plugins = field(factory=list)
-    metric: Annotated[str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables.")] = "total_bad_1"
+    metric: Annotated[
+        str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables; `matbench list` names all.")
+    ] = "total_bad_1"
     timeout: Annotated[
         str, Parameter(help="Seconds that each cell may take, reading, warm-up and recording included; or none.")
     ] = f"{limits.HOUR:g}"
@@ -78,7 +79,7 @@ class Options:
         bool,
         Parameter(
             negative="",
-            help="Solve again, at the end and one at a time, what others disturbed: then all seconds compare.",
+            help="Solve again, at the end and one by one, cells that other cells or programs disturbed.",
         ),
     ] = False
     repeats: Annotated[str, Parameter(help="Solve every cell so often: does a method repeat itself?")] = "1"
@@ -134,6 +135,7 @@ def whole(name: str, text: str) -> int:
 
 def check_metric(metric: str, files: Sequence[Path] = ()) -> None:
     """Raise UserError where no metric has that name, in the users' own files neither."""
+    from matbench.plans.plugins import using
     from matbench.results import scores
 
     with using(files):
@@ -142,6 +144,7 @@ def check_metric(metric: str, files: Sequence[Path] = ()) -> None:
 
 def is_of_volumes(metric: str, files: Sequence[Path] = ()) -> bool:
     """Does this metric score volumes? Then they must be kept."""
+    from matbench.plans.plugins import using
     from matbench.results import scores
 
     with using(files):

@@ -125,15 +125,15 @@ METRICS: tuple[VolumeMetric, ...] = (
             f"surface_{name}_{t}",
             "%",
             "higher",
-            about.format(t),
+            about.format("1 plane" if t == 1 else f"{t} planes"),
             partial(compute, tolerance=t),
             answered_only=compute is precision,
         )
         for t in _TOLERANCES
         for name, about, compute in (
-            ("precision", "material points within {} planes of the surface, of those not behind it", precision),
-            ("recall", "rays with a material point within {} planes of the surface", recall),
-            ("f", "harmonic mean of the two, within {} planes", f_score),
+            ("precision", "material points within {} of the surface, of those not behind it", precision),
+            ("recall", "rays with a material point within {} of the surface", recall),
+            ("f", "harmonic mean of the two, within {}", f_score),
         )
     ),
     VolumeMetric("brier", "", "lower", "squared error of materiality as a probability of surface", brier),

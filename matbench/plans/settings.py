@@ -6,6 +6,7 @@ from typing import Literal
 from attrs import field, frozen
 from attrs.validators import in_
 
+from matbench.errors import UserError
 from matbench.plans import limits
 from matbench.plans.record_option import RecordOption
 
@@ -44,12 +45,12 @@ class Settings:
         workers on this machine; None for no cluster.
     steady
         Solve those cells once more, one at a time and at the end, whose seconds are in doubt because others took the
-        processors meanwhile.
+        processors meanwhile. Not with `dask`.
 
     Raises
     ------
     UserError
-        For a limit or a count that makes no sense.
+        For a limit or a count that makes no sense, and for `steady` with `dask`.
     """
 
     data: Path | None = None
@@ -63,6 +64,10 @@ class Settings:
     isolation: str = field(default="process", converter=limits.isolation)
     dask: str | None = None
     steady: bool = False
+
+    def __attrs_post_init__(self) -> None:
+        if self.steady and self.dask is not None:
+            raise UserError("steady solves cells again on this machine: leave it out where dask hands them out")
 
     def threads_each(self) -> int:
         """How many threads each method is given on this machine."""

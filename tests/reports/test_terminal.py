@@ -65,6 +65,13 @@ def test_no_number_is_cut_off_where_numbers_are_wide() -> None:
         assert sum("5.7e+36" in line and line.rstrip().endswith("1.25*") for line in lines) == 12, width
 
 
+def test_names_of_methods_are_not_broken_in_80_columns() -> None:
+    results, cells = run_of("total_bad_1", {"voxel_coloring": 56.02, "mine[share=0.25]": 89.29})
+    text = printed(80, results, cells.assign(doubt="others took 1 processor seconds of 1 s"), "total_bad_1")
+    assert "voxel_coloring " in text.split("in 'all'")[0]
+    assert "mine[share=0.25] " in text.split("in 'all'")[0]
+
+
 def test_regions_over_all_views_have_a_table_of_their_own() -> None:
     values = {"materiality": 1.5, "okutomi_kanade": 2.5}
     run = run_of("total_bad_1", values, (*REGIONS, *tables.VIEWS))

@@ -14,6 +14,7 @@ import pytest
 from places import METHODS, ROUGH
 
 from matbench import comparison
+from matbench.errors import UserError
 from matbench.plans import limits
 from matbench.plans.settings import Settings
 from matbench.rescoring import open_run
@@ -109,6 +110,11 @@ def test_what_others_disturbed_is_solved_once_more(tmp_path: Path) -> None:
     # two at once are never alone: both are solved once more
     assert sorted(begun) == sorted([str(cell) for cell in ready.plan.cells] * 2)
     assert all(found is not None and found.alone for found in map(ready.store.outcome, ready.plan.cells))
+
+
+def test_a_cluster_solves_nothing_again_on_this_machine() -> None:
+    with pytest.raises(UserError, match=r"steady .* dask"):
+        Settings(steady=True, dask="local")
 
 
 def test_a_doubtful_cell_is_due_again_only_if_asked_for(tmp_path: Path) -> None:
