@@ -127,7 +127,7 @@ def test_what_is_offered_is_listed(place: Path, run) -> None:
     assert "mine" in told["algorithms"]
     missed(run, "does not exist", "list", "--plugin", "none.py")
     missed(run, "walls.py holds no method", "check", "walls.py")
-    assert run("list", *FILES)[1].count("96x72") == 1, "a size that is its own name is told once"
+    assert run("list", *FILES)[1].count("96x72") == 2, "of two walls; a size that is its own name is told once"
 
 
 def test_pictures_of_metrics_are_drawn(place: Path, run) -> None:
