@@ -355,8 +355,8 @@ def _timed(outcome: Outcome, count: Count, threads: int) -> Outcome:
     outcome = intake.corrected(outcome, solve.wall)
     if not outcome.doubt and looked.is_disturbed(threads, cores()):
         taken = looked.others + looked.stolen
-        while_ = "meanwhile" if looked is solve else f"in the {looked.wall:.2g} s of its warm-up and solve"
-        outcome = evolve(outcome, doubt=f"others took {taken:.2g} processor seconds {while_}")
+        when = "meanwhile" if looked is solve else f"in the {looked.wall:.2g} s of its warm-up and solve"
+        outcome = evolve(outcome, doubt=f"others took {taken:.2g} processor seconds {when}")
     return evolve(
         outcome,
         peak_mb=max(outcome.peak_mb or 0.0, count.peak_mb),
