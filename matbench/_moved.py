@@ -17,6 +17,7 @@ MODULES = {
     "matbench.metrics": "matbench.measures.metrics",
     "matbench.plan": "matbench.plans.plan",
     "matbench.prediction": "matbench.measures.prediction",
+    "matbench.recorded": "matbench.plans.record_option",
     "matbench.run": "matbench.solving.run",
     "matbench.settings": "matbench.plans.settings",
     "matbench.statistics": "matbench.measures.statistics",

@@ -94,7 +94,13 @@ def main(tokens: Sequence[str] | None = None) -> None:
     sys.exit(status)
 
 
-def _warning(message: Warning | str, category: type[Warning], filename: str, lineno: int, _: str | None = None) -> str:
+def _warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,  # noqa: ARG001 -- the standard library gives it
+) -> str:
     """A warning in one line; what the harness says to users goes without a line of its code."""
     place = "" if category is UserWarning else f"{filename}:{lineno}: {category.__name__}: "
     return f"matbench: {place}{message}\n"

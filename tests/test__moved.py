@@ -60,3 +60,11 @@ def test_a_plug_in_written_before_the_move_works(tmp_path) -> None:
     )
     table = matbench.compare("old", "synthetic/box[size=48x36]", plugin=tmp_path / "old.py", out=tmp_path / "run")
     assert (table[table["metric"] == "worst"]["value"].max()) > 1
+
+
+def test_what_scripts_give_to_compare_is_found_under_its_old_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    from matbench.plans.record_option import RecordOption
+
+    monkeypatch.delitem(sys.modules, "matbench.recorded", raising=False)
+    with pytest.warns(DeprecationWarning, match=r"matbench\.recorded has moved"):
+        assert import_module("matbench.recorded").Recording is RecordOption

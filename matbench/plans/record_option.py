@@ -92,6 +92,10 @@ class RecordOption:
         return has_parts and self.passes >= other.passes and set(other.rows) <= set(self.rows)
 
 
+Recording = RecordOption
+"""Its old name, which scripts pass to `matbench.compare`."""
+
+
 def _whole(name: str, text: str, most: int = 999_999_999) -> int:
     if not re.fullmatch(r"[0-9]{1,9}", text) or int(text) > most:
         raise UserError(f"{name} {text!r} is not a whole number from 0 to {most}")
