@@ -176,6 +176,11 @@ def _publish(
             voice.say(tables.none_scored(cells))
         for line in found.unsteady:
             voice.say(f"does not repeat itself: {line}")
+        doubtful = sum(outcome.is_doubtful for outcome in found.outcomes.values())
+        if ready.settings.steady and doubtful:
+            voice.say(
+                f"{doubtful} cells are still in doubt, others took the processors again: the same command retries"
+            )
         if say_paths:
             _say_paths(ready, written, voice)
     return cells
