@@ -179,7 +179,7 @@ def _publish(
         doubtful = sum(outcome.is_doubtful for outcome in found.outcomes.values())
         if ready.settings.steady and doubtful:
             voice.say(
-                f"{doubtful} cells are still in doubt, others took the processors again: the same command retries"
+                f"{doubtful} cells are still in doubt, others took processors again: the same command retries"
             )
         if say_paths:
             _say_paths(ready, written, voice)
