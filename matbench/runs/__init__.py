@@ -1,4 +1,4 @@
-"""What has been done: the run folder, who works on it, what is left.
+"""Runs on disk: the run folder, who works on it, what is done and what is left.
 
 Imports the basic modules, `files`, `measures` and `plans`.
 """

@@ -1,4 +1,4 @@
-"""One process works on a run folder at a time; who, and on what, can be seen from elsewhere."""
+"""The lock of a run folder: one process works on it at a time, and others can see which one, and on what."""
 
 import json
 import os
@@ -16,21 +16,22 @@ from filelock import FileLock, Timeout
 from matbench.errors import UserError
 
 LOCK, WORK = ".lock", ".work.json"
-"""What lies in a run folder: the lock, which the system takes from a process that ends; and who has it, for people."""
+"""Two files in a run folder. The first is locked; the system unlocks it when the process that holds it ends. The
+second says who holds the lock, for people to read."""
 
-_PATIENCE = 2.0  # seconds: `is_locked` holds the lock for a moment, too
+_PATIENCE = 2.0  # seconds to wait: another process that only asks `is_locked` holds the lock for a moment, too
 
 
 @define
 class Work:
-    """What the process that holds the lock is at.
+    """What the process that holds the lock is doing.
 
     Parameters
     ----------
     since
         Seconds since 1970 when it took the lock.
     running
-        Key of each cell under way -> when it was started.
+        Key of each cell under way -> when it started, in seconds since 1970.
     """
 
     folder: Path
@@ -48,10 +49,11 @@ class Work:
         self.tell()
 
     def tell(self) -> None:
-        """Write it down for others; a disk that is full must not end a run for this."""
+        """Write the facts to `WORK`, for other processes. Failures are ignored: a full disk must not end a run here."""
         facts = {"pid": self.pid, "host": self.host, "since": self.since, "running": self.running}
         draft = self.folder / f"{WORK}.{self.pid}"
         with suppress(OSError):
+            # "x" makes a new file: opened in any other way, a link that lies there would be followed
             draft.unlink(missing_ok=True)
             with draft.open("x", encoding="utf-8") as file:
                 json.dump(facts, file)
@@ -59,30 +61,31 @@ class Work:
 
     @classmethod
     def read(cls, folder: Path) -> "Work | None":
-        """What was told last; None if nothing was, or something else lies there."""
+        """What the holder wrote last; None if there is no such file, or it holds something else."""
         try:
             found = json.loads((folder / WORK).read_text(encoding="utf-8"))
             running = {str(key): float(begun) for key, begun in found["running"].items()}
             work = cls(folder, int(found["pid"]), str(found["host"]), float(found["since"]), running)
+            # the folder may come from anywhere, and these facts are printed
             is_plain = work.host.isprintable() and all(map(isfinite, (work.since, *running.values())))
             return work if is_plain else None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return None
 
 
-_held: dict[tuple[Path, int], Work] = {}  # folder and thread
+_held: dict[tuple[Path, int], Work] = {}  # by folder and thread: only the thread that holds a lock may enter again
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[Work]:
-    """Be the one that works on a run folder; a thread that is may ask again.
+    """Hold the lock of a run folder while the block runs. The thread that holds it may ask again.
 
-    The system gives the lock back when a process ends, however it ends.
+    The system frees the lock when the process ends, however it ends.
 
     Raises
     ------
     UserError
-        If another process has it, or the folder cannot be locked.
+        If another process holds it, or the folder cannot be locked.
     """
     place = folder.resolve()
     key = place, get_ident()
@@ -109,11 +112,12 @@ def locked(folder: Path) -> Iterator[Work]:
 
 
 def is_locked(folder: Path) -> bool:
-    """Does a process work on a run folder? One that may not be written to is said to be at rest."""
+    """Does a process work on a run folder? The answer is no where this process may not lock the folder."""
     if (folder.resolve(), get_ident()) in _held:
         return True
     if not (folder / LOCK).exists():
         return False
+    # the file stays when a run ends: only an attempt to lock it tells
     lock = FileLock(folder / LOCK)
     try:
         lock.acquire(timeout=0)

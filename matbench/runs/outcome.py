@@ -1,4 +1,4 @@
-"""What became of a cell."""
+"""The outcome of a cell: how its solve ended, and what it cost."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -8,29 +8,30 @@ from attrs import field, frozen
 from matbench.plans.record_option import RecordOption
 
 Status = Literal["ok", "skipped", "failed", "timeout", "out-of-memory", "crashed", "interrupted"]
-FINAL: frozenset[Status] = frozenset({"ok", "skipped"})
+FINAL: frozenset[Status] = frozenset({"ok", "skipped"})  # these are not solved again: they would end the same way
 _LONGEST = 2000  # characters of a reason
 
 
 def _one_line(text: str) -> str:
-    """What a method, or whoever wrote a run folder, has to say, as one line that can be printed."""
+    """A text from a method or from a run folder of any origin, as one line that is safe to print."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:_LONGEST].rstrip()
 
 
 @frozen
 class Outcome:
-    """What became of a cell.
+    """How the solve of a cell ended, and what it cost.
 
     Parameters
     ----------
     seconds
         Wall time of the solve alone: no imports, no compilation, no recording.
     processor_seconds
-        Of the solve, over all processors: of the cell's process and of all that it started.
+        Processor time of the solve, summed over all processors: that of the cell's process and of all that it started.
     others_seconds
-        Processor seconds that all else on the machine took meanwhile, another machine's on the same processor included.
+        Processor seconds that everything else on the machine took during the solve. What other virtual machines took
+        from the same processors counts, too.
     doubt
-        Why `seconds` cannot be compared, in words: others took the processors, or two clocks disagree.
+        Why `seconds` cannot be compared, in words: others took the processors, or two clocks disagree. Empty if it can.
     warmup_seconds
         Wall time of a first solve on a tiny scene of the same kind, compilation included.
     peak_mb
@@ -38,13 +39,13 @@ class Outcome:
     reason
         Why it is not `ok`, in one line.
     has_volume
-        Did the estimate have a volume that could be kept? It is kept only on request.
+        True if the estimate has a volume that can be stored. It is stored only on request.
     work, history
-        As the estimate gave them; None for a number that is not finite.
+        As in the method's estimate. None stands for a number that is not finite.
     recorded
         What its recording holds, if it has one.
     alone
-        Did no other cell of the run run meanwhile? Otherwise `seconds` is not comparable.
+        True if no other cell of the run was solved at the same time. Otherwise `seconds` cannot be compared.
     maps
         Digest of its maps (`maps_digest`), if it has any.
     ran_on
@@ -70,5 +71,5 @@ class Outcome:
 
     @property
     def is_doubtful(self) -> bool:
-        """Was it timed while others, be they other cells, took the processors? Then `seconds` cannot be compared."""
+        """Was the solve disturbed, by other cells or by other programs? Then `seconds` cannot be compared."""
         return self.status == "ok" and (bool(self.doubt) or not self.alone)

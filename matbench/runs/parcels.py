@@ -1,4 +1,4 @@
-"""Cells on their way from another machine: packed into bytes there, checked and put in place here."""
+"""Cells that another machine has solved: packed into bytes there, checked and stored here."""
 
 import json
 from io import BytesIO
@@ -18,11 +18,11 @@ FILES = {
     "volume.npz": 1 << 33,
     "recording.rrd": 1 << 33,
 }
-"""What a cell may consist of -> the most bytes of it."""
+"""File that a cell may consist of -> its largest size in bytes, unpacked: a faulty sender must not fill the disk."""
 
 
 def pack(folder: Path) -> bytes:
-    """A cell's folder as a zip archive; its large files are compressed already."""
+    """A cell's folder as a zip archive. Nothing is compressed: the large files are compressed already."""
     packed = BytesIO()
     with ZipFile(packed, "w", ZIP_STORED) as archive:
         for name in FILES:
@@ -32,16 +32,17 @@ def pack(folder: Path) -> bytes:
 
 
 def put(store: Store, cell: Cell, parcel: bytes) -> Outcome:
-    """Put a cell that came as an archive in its place, whole; one that comes twice replaces itself.
+    """Check a cell that came as an archive, and store it whole or not at all. If it comes twice, the second one stays.
 
     Raises
     ------
     ArchiveError
-        If what came is not this cell, or is damaged. The store is then as it was.
+        If the archive is not this cell, or is damaged. The store is then as it was.
     OSError
         If it cannot be written.
     """
     with TemporaryDirectory(dir=store.folder / "cells", prefix=f".{cell.key}.") as folder:
+        # unpacked into a store of its own, where it is read like any cell: only a whole one is moved to its place
         beside = Store(Path(folder))
         place = beside.cell(cell)
         place.mkdir(parents=True)
@@ -63,12 +64,12 @@ def _unpack(parcel: bytes, file: Path, place: Path) -> None:
 
 
 def _outcome(store: Store, cell: Cell) -> Outcome:
-    """The outcome of what claims to be a cell.
+    """The outcome in files that claim to be this cell.
 
     Raises
     ------
     ArchiveError
-        If it is another one, or none.
+        If they are another cell, or no whole one.
     """
     try:
         key = json.loads((store.cell(cell) / "cell.json").read_text(encoding="utf-8"))["cell"]["key"]

@@ -1,4 +1,4 @@
-"""What something ran on: machine, libraries, state of the harness."""
+"""What a cell ran on: the machine, the libraries, the version of the harness."""
 
 import os
 import platform
@@ -19,10 +19,10 @@ LIBRARIES = ("numpy", "numba", "opencv-python-headless", "scipy", "rerun-sdk")
 
 @cache
 def ran_on() -> Mapping[str, str]:
-    """The machine and the versions that this process runs on, as shown.
+    """The machine and the versions that this process runs on, as reports show them.
 
-    ``machine`` is a digest by which timings are told apart: of the host's name (which so is not
-    given away), the processor, cores, memory, governor and system.
+    ``machine`` is a digest: only timings with the same digest are compared. It is taken over the host's
+    name (which it does not reveal), the system, the processor, cores, memory and governor.
     """
     hardware = {
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
@@ -31,6 +31,7 @@ def ran_on() -> Mapping[str, str]:
         "memory": _memory(),
         "governor": _governor(),
     }
+    # a new kernel does not make another machine: of the system only its kind counts
     alike = "|".join([platform.node(), platform.system(), *list(hardware.values())[1:]])
     return {
         "machine": sha256(alike.encode()).hexdigest()[:8],
@@ -44,10 +45,13 @@ def ran_on() -> Mapping[str, str]:
 
 @cache
 def commit() -> str:
-    """The commit of the checkout that the harness runs from, ``+ changes`` if files differ; ``none`` elsewhere."""
+    """The commit of the checkout that the harness runs from; ``none`` if it is installed.
+
+    ``+ changes`` follows if tracked files differ from the commit.
+    """
     root = Path(__file__).parents[2]
     git = shutil.which("git")
-    if git is None or not (root / ".git").exists():  # installed below somebody else's checkout it is none
+    if git is None or not (root / ".git").exists():  # git alone would also find a checkout around an installed harness
         return "none"
     try:
         said = [
@@ -61,7 +65,7 @@ def commit() -> str:
 
 @contextmanager
 def commit_known() -> Iterator[None]:
-    """Let the processes started meanwhile know the commit, which takes a while to find out."""
+    """Pass the commit to the processes that are started within the block: each would take a while to find it out."""
     os.environ[_COMMIT] = commit()
     try:
         yield
@@ -70,7 +74,7 @@ def commit_known() -> Iterator[None]:
 
 
 def combined(found: Iterable[Mapping[str, str]]) -> dict[str, str]:
-    """The facts of several cells as one: where they differ, each value once."""
+    """The facts of several cells, joined. Where they differ, each value stands once: ``"4; 8"``."""
     values: dict[str, dict[str, None]] = {}
     for facts in found:
         for name, value in facts.items():

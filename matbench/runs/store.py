@@ -39,7 +39,7 @@ _json = make_converter()
 
 @frozen(eq=False)
 class Solved:
-    """A stored cell, its facts and its maps read at one time: they belong together.
+    """A stored cell. Its facts and its maps are read together, so they belong to the same solve.
 
     Parameters
     ----------
@@ -58,12 +58,12 @@ class Solved:
 
     @cached_property
     def volume(self) -> StoredVolume | None:
-        """The volume that was kept, read when it is asked for; None where there is none, or a damaged one."""
+        """The stored volume, read only when it is asked for: it is large. None if there is none, or it is damaged."""
         return _volume(self.place) if self.outcome is not None and self.outcome.has_volume else None
 
 
 class FolderLost(UserError):
-    """The run folder cannot be written or read any more: the disk is full, the network gone."""
+    """The run folder can no longer be written or read: the disk is full, or the network is gone."""
 
     @classmethod
     def of(cls, folder: Path, error: OSError) -> "FolderLost":
@@ -103,7 +103,7 @@ def read_maps(path: Path) -> dict[int, NDArray[np.float32]]:
 
 
 def _to_disk(folder: Path) -> None:
-    """Have the system write a folder's files out: where it cannot, that is an error here and not later."""
+    """Wait until a folder's files are on the disk. If they cannot be written, the error comes here and not later."""
     for path in [*folder.iterdir(), folder]:
         number = os.open(path, os.O_RDONLY)
         try:
@@ -118,7 +118,7 @@ _TABLE_DRAFT = re.compile(
 
 
 def _is_ours(name: str) -> bool:
-    """May a folder that holds this, and no plan, become a run? A run that was killed at once leaves no more."""
+    """Is a file of that name what a run leaves that is killed before it writes its plan? Such a folder may be used."""
     return name == LOCK or name.startswith((WORK, ".plan.json."))
 
 
@@ -130,7 +130,7 @@ class Store:
 
     @classmethod
     def open(cls, folder: Path, plan: Plan, command: str = "") -> "Store":
-        """Make a run folder for a plan, or take up the one that holds the same request.
+        """Make a run folder for a plan, or continue the run there if it is of the same request.
 
         Parameters
         ----------
@@ -168,12 +168,12 @@ class Store:
         self.check_place()
 
     def check_place(self) -> None:
-        """Raise UserError if the cells lie elsewhere: a link may not lead what is written, or removed, out."""
+        """Raise UserError if ``cells`` is a link: nothing outside of the run folder may be written or removed."""
         if (self.folder / "cells").is_symlink():
             raise UserError(f"{self.folder / 'cells'} is a link: the cells of a run lie in its own folder")
 
     def write_plan(self, plan: Plan, command: str = "") -> None:
-        """Write ``plan.json`` and make the place for cells, unless they are there."""
+        """Write ``plan.json`` and make the folder for cells, unless they exist."""
         path = self.folder / "plan.json"
         known = self._read(path).get("command", "") if path.exists() else ""
         facts = {"request": plan.request, "command": command or known, **_json.unstructure(plan)}
@@ -220,12 +220,12 @@ class Store:
         return self.folder / "cells" / cell.key
 
     def outcome(self, cell: Cell) -> Outcome | None:
-        """What became of a cell by its facts alone, or None if it has not been computed, or these are damaged.
+        """A cell's outcome, without a look at its maps. None if it is not computed, or ``cell.json`` is damaged.
 
         Raises
         ------
         FolderLost
-            If the folder cannot be read: nobody knows what is in it.
+            If the folder cannot be read, so that its content is unknown.
         """
         try:
             facts = json.loads((self.cell(cell) / "cell.json").read_text(encoding="utf-8"))
@@ -239,14 +239,14 @@ class Store:
         return outcome
 
     def read(self, cell: Cell) -> "Solved":
-        """A cell with its maps, which are read once and must be those that were stored.
+        """Read a cell with its maps, and check the maps against their digest.
 
-        Without an outcome if it has not been computed, or its files are damaged.
+        The outcome is None if the cell is not computed, or its files are damaged.
 
         Raises
         ------
         FolderLost
-            If the folder cannot be read: nobody knows what is in it.
+            If the folder cannot be read, so that its content is unknown.
         """
         outcome, place = self.outcome(cell), self.cell(cell)
         if outcome is None or outcome.status != "ok":
@@ -261,19 +261,19 @@ class Store:
         return Solved(cell, outcome, place, maps)
 
     def _check_readable(self, error: Exception) -> None:
-        """Raise FolderLost for an error that does not say that a file is missing or damaged."""
+        """Raise FolderLost unless the error says that a file is missing or damaged."""
         if isinstance(error, OSError) and error.errno is not None and error.errno not in _ABSENT:
             raise FolderLost.of(self.folder, error) from error
 
     def fingerprint(self, cell: Cell) -> str:
-        """SHA-256 of what is stored of a cell, its maps by their digest; empty where nothing is."""
+        """SHA-256 of a stored cell's facts, which hold the digest of its maps; empty if there is none."""
         try:
             return sha256((self.cell(cell) / "cell.json").read_bytes()).hexdigest()
         except OSError:
             return ""
 
     def stale(self, plan: Plan) -> list[Cell]:
-        """The stored cells that are none of the plan's: of other code, other pixels, other repeats."""
+        """The stored cells that do not belong to the plan: those of other code, other pixels, other repeats."""
         current = {cell.key for cell in plan.cells}
         found = []
         for path in sorted((self.folder / "cells").glob("*/cell.json")):
@@ -289,12 +289,12 @@ class Store:
 
     @contextmanager
     def building(self, cell: Cell) -> Iterator[Path]:
-        """A folder beside a cell's place, moved there when the block ends, removed if it fails."""
+        """A draft folder for a cell. It becomes the cell's folder when the block ends; if the block fails, it goes."""
         draft = Path(tempfile.mkdtemp(prefix=f".{cell.key}.", dir=self.folder / "cells"))
         try:
             yield draft
             _to_disk(draft)
-            draft.chmod(0o755)
+            draft.chmod(0o755)  # mkdtemp made it for this user alone, but others may read a run
             self._place(draft, cell)
         finally:
             shutil.rmtree(draft, ignore_errors=True)
@@ -312,14 +312,14 @@ class Store:
                 return
 
     def remove(self, cell: Cell) -> None:
-        """Take a cell away, in one step: aside first, then to pieces."""
+        """Remove a cell in one step: its folder is moved aside before its files are deleted."""
         aside = Path(tempfile.mkdtemp(prefix=".removed.", dir=self.folder / "cells"))
         with suppress(FileNotFoundError):
             self.cell(cell).replace(aside / cell.key)
         shutil.rmtree(aside, ignore_errors=True)
 
     def try_out(self) -> None:
-        """Raise FolderLost if a cell could not be kept: see whether a mebibyte can be written."""
+        """Write a mebibyte and raise FolderLost if that fails: better before a long solve than after it."""
         try:
             with tempfile.TemporaryFile(dir=self.folder / "cells") as file:
                 file.write(os.urandom(1 << 20))
@@ -348,7 +348,7 @@ class Store:
         return recorded[(exact or hits)[0]]
 
     def sweep(self) -> None:
-        """Remove what runs that were killed left beside the cells, and half-written tables."""
+        """Remove what killed runs have left: drafts of cells, and half-written tables."""
         self.check_place()
         for draft in (self.folder / "cells").glob(".*"):
             if _DRAFT.fullmatch(draft.name):
@@ -369,7 +369,7 @@ class Store:
         return read_maps(self.cell(cell) / "disparity.npz")
 
     def volume(self, cell: Cell) -> StoredVolume | None:
-        """The stored volume, or None where there is none, or a damaged one."""
+        """The stored volume; None if there is none, or it is damaged."""
         return _volume(self.cell(cell))
 
 
@@ -387,7 +387,7 @@ def write_cell(
     disparity: Mapping[int, NDArray[np.float32]] | None = None,
     volume: StoredVolume | None = None,
 ) -> None:
-    """Fill a cell's folder: its facts and, where it has them, its maps and its volume."""
+    """Fill a cell's draft folder with its facts and, if it has them, its maps and its volume."""
     if volume is not None:
         volume.write(draft / "volume.npz")
     if disparity is not None:

@@ -1,4 +1,4 @@
-"""What of a plan is left to do, and why."""
+"""Which cells of a plan are left to compute, and why."""
 
 from collections.abc import Mapping
 
@@ -12,14 +12,14 @@ from matbench.runs.store import Store
 
 @frozen(eq=False)
 class Todo:
-    """What a run computes, from one look at every cell of its plan.
+    """The cells that a run has to compute, found by reading every cell of its plan once.
 
     Parameters
     ----------
     cells
-        What is to be computed, in the plan's order.
+        The cells to compute, in the plan's order.
     outcomes
-        Key -> what became of each cell that is stored whole.
+        Key -> outcome, for each cell that is stored whole.
     """
 
     cells: tuple[Cell, ...] = ()
@@ -27,10 +27,11 @@ class Todo:
 
 
 def pending(plan: Plan, store: Store, settings: Settings) -> Todo:
-    """The cells that a run computes: by default those without a final outcome, or without what was asked for besides.
+    """The cells that a run has to compute.
 
-    That is a recording that holds what is asked for, and the volume of a method that has one.
-    `Settings.only` takes fewer, or all. Every map is read: one that is damaged is computed anew.
+    By default these are the cells without a final outcome, and those that lack a recording or a volume
+    that was asked for. `Settings.only` takes fewer of them, or all cells. Every map is read: a cell whose
+    map is damaged is computed again.
     """
     cells, outcomes = [], {}
     for cell in plan.cells:
@@ -46,7 +47,7 @@ def pending(plan: Plan, store: Store, settings: Settings) -> Todo:
 
 
 def explained(plan: Plan, store: Store, settings: Settings) -> list[tuple[Cell, str]]:
-    """`pending`, with the reason for each, in words."""
+    """The cells of `pending`, each with the reason in words."""
     before: dict[tuple[str, str, str, int, int], list[Cell]] = {}
     for old in store.stale(plan):
         before.setdefault(old.question, []).append(old)
@@ -62,12 +63,12 @@ def explained(plan: Plan, store: Store, settings: Settings) -> list[tuple[Cell, 
 
 
 def _lacks(cell: Cell, outcome: Outcome | None, store: Store, settings: Settings) -> str:
-    """What is not there of what was asked for; empty if all is."""
+    """What a cell lacks of what was asked for, in words; empty if it lacks nothing."""
     if outcome is None:
         return "its files are damaged" if store.cell(cell).exists() else "not computed yet"
     if settings.steady and outcome.is_doubtful:
         return f"its seconds are in doubt: {outcome.doubt or 'other cells ran meanwhile'}"
-    if cell.repeat:
+    if cell.repeat:  # it is solved only to compare its maps: neither a volume nor a recording is wanted of it
         return ""
     if settings.volumes and outcome.has_volume and store.volume(cell) is None:
         return "its volume was not kept"
@@ -85,7 +86,8 @@ def _reason(cell: Cell, outcome: Outcome | None, store: Store, settings: Setting
 
 
 def _changed(cell: Cell, before: list[Cell]) -> str:
-    """Why what was computed before does not count any more."""
+    """Why the stored cells that asked the same before do not count any more."""
+    # with the same code and pixels, only `matbench.plans.plan.SCHEMA` can have made another key
     if any(old.scene_digest == cell.scene_digest and old.method.code == cell.method.code for old in before):
         return "stored by another version of matbench"
     if any(old.scene_digest == cell.scene_digest for old in before):
