@@ -68,9 +68,9 @@ def check_varies(methods: Sequence[Method], scenes: Sequence[str]) -> None:
 def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
     """The change of every metric and region when one factor goes from its base to another level.
 
-    All else is equal within a difference: the other parameters, scene, seed, region. Differences
-    are averaged within a scene, over its options, seeds and the other factors' levels; effects are
-    over the scenes in which the region counts (`matbench.results.comparable.counted`) and nothing is missing.
+    Within a difference all else is equal: the other parameters, scene, seed and region. Differences are first
+    averaged within a scene: over its options, the seeds and the levels of the other factors. Effects are then
+    over the scenes in which the region counts (`matbench.results.comparable.counted`) and no value is missing.
 
     Parameters
     ----------
@@ -79,10 +79,9 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    Columns `COLUMNS`: `change` is the mean of level minus base in `unit`, `low` and `high` its
-    interval, and so on as in `matbench.measures.statistics.Effect`; `answered` is the per cent of the pixels that
-    the value is over, of the level that answers less, and below `matbench.measures.metrics.ENOUGH` the verdict is
-    `SILENT`.
+    Columns `COLUMNS`. `change` is the mean of level minus base in `unit`; `low` and `high` are its interval; the
+    rest is as in `matbench.measures.statistics.Effect`. `answered` is the per cent of the pixels that the value is
+    over, for the level that answers less. Below `matbench.measures.metrics.ENOUGH` the verdict is `SILENT`.
     """
     methods = list({str(cell.method): cell.method for cell in plan.cells}.values())
     by_label = {(method.algorithm, method.changed): method for method in methods}
@@ -113,9 +112,10 @@ _HEADS = ("region", "metric", "unit")
 
 
 def _by_scene(changes: pd.Series) -> pd.Series:
-    """Means within each scene, over all else that is equal within a change.
+    """The mean change of each scene, over its options, the seeds and the levels of the other factors.
 
-    Where a scene's option or a seed lacks a value, it is not averaged away; a combination of the other factors may.
+    A combination of levels counts only if it has a value for every option and seed: otherwise a failure on a hard
+    variant of the scene would make the mean look better. Combinations that do not count are left out.
     """
     groups = changes.groupby([*_HEADS, "shown", "rest"], sort=False)
     whole = groups.mean().where(groups.count() == groups.size())
@@ -123,11 +123,12 @@ def _by_scene(changes: pd.Series) -> pd.Series:
 
 
 def _levels_side_by_side(results: pd.DataFrame, methods: Mapping[tuple[str, str], Method], factor: str) -> pd.DataFrame:
-    """One column for each level of the factor, of `value` and of `answered`; the index names all that is equal."""
+    """`value` and `answered`, each with one column for every level of the factor; the index holds what is equal."""
     labels = list(zip(results["algorithm"], results["params"], strict=True))
     level = [text({factor: methods[label].params[factor]}) for label in labels]
     rest = [text({k: v for k, v in methods[label].params.items() if k != factor}) for label in labels]
-    shown = results["scene"].map(lambda scene: read_scene(str(scene)).name)  # noisy or in half size, it is one scene
+    # with noise or in half size it is still the same scene, and no second witness
+    shown = results["scene"].map(lambda scene: read_scene(str(scene)).name)
     keys = ["rest", "shown", "scene", "seed", "region", "metric", "unit"]
     known = results.assign(level=level, rest=rest, shown=shown)
     return known.pivot(index=keys, columns="level", values=["value", "answered"])

@@ -1,4 +1,4 @@
-"""A run as one file that holds what is needed to check its tables, and nothing that could harm who opens it."""
+"""A run as one archive: all that is needed to check its tables, and nothing that can harm the person who opens it."""
 
 import json
 import re
@@ -30,36 +30,37 @@ TOP = (
     "reliability.csv",
     "report.html",
 )
-"""What may lie in a run folder besides the cells."""
+"""The files of a run folder that are exported, besides the cells."""
 CELL = ("cell.json", "disparity.npz", "volume.npz", "log.txt")
-"""What is exported of a cell: no recordings, which are large and decide no score."""
+"""The files of a cell that are exported. Recordings are not: they are large, and no score depends on them."""
 
 _NAME = re.compile(rf"({'|'.join(map(re.escape, TOP))})|cells/[0-9a-f]{{16}}/({'|'.join(map(re.escape, CELL))})")
-_EPOCH = (1980, 1, 1, 0, 0, 0)
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the same time for all members: an archive's bytes do not depend on when it is written
 _MOST = 1 << 26  # bytes of a manifest
 _CHUNK = 1 << 20
 
 
 def files_of(store: Store, cell: Cell) -> list[Path]:
-    """The files of a cell that decide its scores, or tell how it went; links are none of them."""
+    """The files of a cell to export. Links are left out: one could lead to any file on this machine."""
     place = store.cell(cell)
     return [] if place.is_symlink() else [path for name in CELL if _is_plain(path := place / name)]
 
 
 def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
-    """Write a run as one archive: the same bytes whenever and wherever the same run is exported.
+    """Write a run as one archive. The same run gives the same bytes, at any time and on any machine.
 
-    Plan, tables, report, and of every cell of the plan its facts, maps, volume and log; what other
-    code or pixels left in the folder is not in it. ``manifest.json`` has the SHA-256 of each file.
+    The archive holds the plan, the tables, the report, and the facts, maps, volume and log of every cell
+    of the plan. Stored cells that do not belong to the plan are left out. ``manifest.json`` holds the
+    SHA-256 of each file.
 
     Parameters
     ----------
     out
-        Where to; beside the folder if not given. An archive that lies there is replaced.
+        Path of the archive; beside the folder if not given. An archive that exists there is replaced.
 
     Returns
     -------
-    Where it is, and how many cells of the plan are not done and so are not in it.
+    The archive's path, and how many cells of the plan it lacks because they are not done.
 
     Raises
     ------
@@ -86,12 +87,12 @@ def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
 
 
 def unpack(path: Path, folder: Path) -> None:
-    """Take an exported run to pieces, into a new folder, and check every file by its digest.
+    """Unpack an exported run into a new folder, and check every file by its digest.
 
     Raises
     ------
     UserError
-        If it is no such archive, holds anything else, or a file is not what the manifest says.
+        If it is no such archive, holds anything else, or a file differs from what the manifest says.
     """
     try:
         with unzip.opened(path) as archive:
@@ -112,7 +113,7 @@ def unpack(path: Path, folder: Path) -> None:
 
 
 def _members(archive: ZipFile) -> dict[str, ZipInfo]:
-    """Name -> member of an archive in which nothing else lies than what `export` writes."""
+    """Name -> member. The archive must hold nothing but what `export` writes."""
     names = [info.filename for info in archive.infolist()]
     safe = {info.filename: info for info in unzip.members(archive, (MANIFEST, *TOP, *CELL))}
     for name in names:
@@ -175,6 +176,7 @@ def _write(place: Path, folder: Path, paths: list[Path]) -> None:
 
 def _info(name: str) -> ZipInfo:
     info = ZipInfo(name, _EPOCH)
+    # arrays are compressed already; the system is named because it would differ between machines
     info.compress_type = ZIP_STORED if name.endswith(".npz") else ZIP_DEFLATED
     info.create_system, info.external_attr = 3, (stat.S_IFREG | 0o644) << 16
     return info

@@ -1,4 +1,4 @@
-"""Which scores may stand beside others: what a region must hold to count, and how much of it must be answered."""
+"""Which scores may be compared: a region must hold enough pixels, and a method must answer enough of them."""
 
 import numpy as np
 import pandas as pd
@@ -8,17 +8,18 @@ from matbench.measures.metrics import ENOUGH
 from matbench.regions import counts
 
 SILENT = "answers too little"
-"""The verdict on a difference where one side is over fewer than `ENOUGH` of the pixels."""
+"""The verdict on a difference if one side answers less than `ENOUGH` per cent of the pixels."""
 
 
 def counted(results: pd.DataFrame) -> NDArray[np.bool_]:
-    """Which rows of ``results.csv`` enter means over scenes.
+    """(rows,) which rows of ``results.csv`` enter means over scenes.
 
-    Not those of scenes whose region holds too little (`matbench.regions.counts`), nor those in which no method has a
-    value. Whether a region counts is a matter of scene, region and metric, so that it is the same for all methods.
+    A row is left out if its region is too small in its scene (`matbench.regions.counts`), or if no method has a value
+    there. This depends only on scene, region and metric, so it is the same for all methods.
     """
     whole = results["pixels"].where(results["region"] == "all")
     known = whole.groupby([results["scene"], results["metric"]]).transform("max").fillna(results["pixels"])
+    # few different sizes occur, so each is asked about once
     place, sizes = pd.MultiIndex.from_arrays([results["pixels"], known]).factorize()
     holds = np.array([counts(int(pixels), int(of)) for pixels, of in sizes], bool)[place]
     keys = [results[name] for name in ("scene", "region", "metric")]
@@ -28,5 +29,6 @@ def counted(results: pd.DataFrame) -> NDArray[np.bool_]:
 
 
 def is_enough(answered: float) -> bool:
-    """Is a score over so much of the pixels, in per cent, that it may be ranked? Yes where nobody knows (NaN)."""
+    """May a score over `answered` per cent of the pixels be ranked? Yes if the share is unknown (NaN)."""
+    # a comparison with NaN is False: this way round it says yes
     return not answered < ENOUGH

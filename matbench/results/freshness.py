@@ -1,4 +1,4 @@
-"""What the tables of a run were made by and from, so that stale ones are recognised."""
+"""Stale tables are recognised: with the tables is kept which code made them, from which cells and scenes."""
 
 import json
 from collections.abc import Mapping
@@ -29,22 +29,23 @@ _json = make_converter()
 
 
 def own_digest() -> str:
-    """As `digest`, over those of the users' own files that are in use and hold metrics; empty if none do."""
+    """Digest of the users' own files that are in use and hold metrics; empty if there are none."""
     files = [file for file in plugins.used() if plugins.own_metrics(file)]
     return plans.digest(sorted(plugins.code_digest(plugins.Plugin("", str(f), object)) for f in files)) if files else ""
 
 
 @cache
 def digest() -> str:
-    """Sixteen hexadecimal digits over all code that turns maps into scores, that of plug-ins' metrics included."""
-    scores = code.of_file(Path(__file__).with_name("scores.py"), alone=True)  # without store and plan, which it reads
+    """Sixteen hexadecimal digits over all code that turns maps into scores, metrics of installed plug-ins included."""
+    # `alone`, without what it imports: a change of the store or the plan changes no score; metrics are added below
+    scores = code.of_file(Path(__file__).with_name("scores.py"), alone=True)
     parts = [scores.digest, code.of_module("matbench.regions").digest]
     parts += sorted(plugins.code_digest(plugin) for plugin in plugins.installed("metrics").values())
     return plans.digest(parts)
 
 
 def by() -> str:
-    """What makes scores here and now: `digest` and, after a plus sign, `own_digest`."""
+    """The code that makes scores in this process: `digest` and, if there are own metrics, ``+`` and `own_digest`."""
     return "+".join(filter(None, (digest(), own_digest())))
 
 
@@ -57,17 +58,17 @@ class Made:
     scorer
         `digest` of the code.
     own
-        `own_digest` of the metrics in users' own files, which nobody but who names them reads.
+        `own_digest`. It is kept apart from `scorer`, because users' own files are read only if they are named.
     truth
         Scene -> digest of its ground truth and regions (`Scene.truth_digest`).
     cells
-        Digest of what was scored: the cells, all that is known of how each ended, its maps.
+        Digest of what was scored: the cells and their outcomes, which hold the digests of their maps.
     tables
-        File -> SHA-256; empty for one that is not there.
+        File -> SHA-256; empty for a file that does not exist.
     unsteady
         The cells whose repeats differ, a line each (`matbench.results.scores.Tables`).
     page
-        Digest of the page and of what it was drawn by and from besides; empty until it is drawn.
+        `page_digest` of the report; empty until it is drawn.
     """
 
     scorer: str
@@ -80,36 +81,43 @@ class Made:
 
     @property
     def by(self) -> str:
-        """As the function of that name."""
+        """The code that made the scores, written as the function `by` writes it."""
         return "+".join(filter(None, (self.scorer, self.own)))
 
     @classmethod
     def now(cls, plan: Plan, store: Store, scenes: Mapping[str, Scene], outcomes: Mapping[str, Outcome]) -> "Made":
-        """How the tables that lie in a run's folder were made, if they were made now, of these outcomes."""
+        """The facts about tables that are made now from these outcomes; their files already lie in the run folder."""
         truth = {cell.scene: scenes[cell.scene].truth_digest for cell in plan.cells}
         tables = {name: _sha256(store.folder / name) for name in TABLES}
         return cls(digest(), truth, _cells(store, outcomes), tables, own=own_digest())
 
     def write(self, store: Store) -> None:
-        """Keep it with the tables."""
+        """Write it into the run folder, beside the tables."""
         write_text(store.folder / FILE, json.dumps(asdict(self), indent=1))
 
 
 def page_digest(store: Store, facts: Any) -> str:
-    """Digest of a run's page, of the code that draws pages, and of what else a page is made from, as plain values."""
+    """Digest of a run's page, of the code that draws pages, and of `facts`; empty if there is no page.
+
+    Parameters
+    ----------
+    facts
+        What else the page is made from, as plain values.
+    """
     return plans.digest([_sha256(store.folder / PAGE), _drawing(), facts]) if (store.folder / PAGE).exists() else ""
 
 
 @cache
 def _drawing() -> str:
-    """Digest of all code and templates from which a page follows, wherever in the harness."""
+    """Digest of all code and templates that may change a page."""
+    # bytes of whole folders: drawing a page once too often costs little, showing a stale one would mislead
     here = Path(__file__).parents[1]
     files = [file for folder in _DRAWING for file in sorted((here / folder).rglob("*")) if file.suffix in _SOURCES]
     return plans.digest([sha256(file.read_bytes()).hexdigest() for file in files])
 
 
 def made(store: Store) -> Made | None:
-    """How the tables of a run were made, or None if nobody knows."""
+    """How the tables of a run were made; None if the file that says so is missing or damaged."""
     try:
         return _json.structure(json.loads((store.folder / FILE).read_text(encoding="utf-8")), Made)
     except Exception:  # whatever a damaged one raises

@@ -13,20 +13,20 @@ from matbench.runs.store import Solved
 
 @frozen
 class Repeats:
-    """What became of a cell that is solved several times.
+    """All solves of a cell that is solved several times.
 
     Parameters
     ----------
     asked, solved
-        How often it is solved in all, and how often it has been.
+        How many solves were asked for, and how many ended ``ok``.
     answers
         How many different maps there were.
     differ
-        Share of a map's pixels that are not always the same.
+        Share of the pixels at which some solve differs from the first.
     failed
-        A repeat that did not end well, if one did not.
+        The first repeat that did not end well; None if all did.
     timed
-        The solves whose seconds count: of those that ended well the ones that nothing disturbed, if there are any.
+        The solves whose seconds count: those that ended ``ok`` undisturbed, or all that ended ``ok`` if there are none.
     """
 
     cell: Cell
@@ -52,7 +52,7 @@ class Repeats:
 
 
 def judged(cell: Cell, asked: int, solves: Iterable[Solved]) -> Repeats:
-    """What came of a cell that is asked for several times: of its maps two are held at once."""
+    """Compare all solves of a cell. Only the maps of two solves are in memory at once."""
     first: Solved | None = None
     solved, answers, alike = 0, set[str](), ""
     timed: list[Outcome] = []
@@ -76,6 +76,6 @@ def judged(cell: Cell, asked: int, solves: Iterable[Solved]) -> Repeats:
 
 
 def _unlike(one: Solved, other: Solved) -> NDArray[np.bool_]:
-    """(pixels,) where two cells' maps, of all views, are not the same; everywhere if they are of other sizes."""
+    """(pixels of all views,) where the maps of two solves differ; (1,) true if their sizes differ."""
     a, b = (np.concatenate([values.ravel() for _, values in sorted(cell.maps.items())]) for cell in (one, other))
     return ~((a == b) | (np.isnan(a) & np.isnan(b))) if a.shape == b.shape else np.ones(1, np.bool_)

@@ -77,14 +77,14 @@ RELIABILITY_COLUMNS = ("algorithm", "params", "scene", "seed", "materiality", "o
 
 
 def metrics() -> tuple[AnyMetric, ...]:
-    """Every metric that plug-ins offer, the built-in ones first; broken plug-ins are left out.
+    """All metrics: built-in ones, then those of installed plug-ins, then those of users' own files in use.
 
-    Those of the users' own files that are `matbench.plans.plugins.used` come last.
+    Broken plug-ins are left out (`broken_metrics`).
 
     Raises
     ------
     UserError
-        If such a file holds no metric of a kind that is known, or one whose name is taken.
+        If a metric in a user's own file is of no known kind, or its name is taken.
     """
     found = {metric.name: metric for metric in _installed()[0]}
     for file in plugins.used():
@@ -102,7 +102,7 @@ def metric_named(name: str) -> AnyMetric:
     Raises
     ------
     UserError
-        If nothing offers it.
+        If there is no such metric.
     """
     known = {metric.name: metric for metric in metrics()}
     if name not in known:
@@ -111,7 +111,7 @@ def metric_named(name: str) -> AnyMetric:
 
 
 def broken_metrics() -> Mapping[str, str]:
-    """The installed metric plug-ins that cannot be imported or give no new metrics, with what is wrong."""
+    """Installed plug-in -> what is wrong with it, if it cannot be imported or offers no metric of a new name."""
     return _installed()[1]
 
 
@@ -141,26 +141,26 @@ def of_volumes(name: str) -> bool:
 
 @frozen(eq=False)
 class Tables:
-    """What one pass over the stored cells of a run gives.
+    """The tables of a run, from one pass over its stored cells.
 
     Parameters
     ----------
     results
-        Columns `RESULT_COLUMNS`, one row for each cell that is ok, region of the reference view and metric: shares
-        in per cent of `pixels`, errors in pixels of the pair. Volumes have rows where they were kept. The prediction
-        of a view held out has one region, ``all``, and that view's label. `answered` is the per cent of the pixels
-        that the value is over, 100 where silence counts against a method.
+        Columns `RESULT_COLUMNS`, one row for each cell with status ``ok``, region of the reference view and metric.
+        Shares are in per cent of `pixels`, errors in pixels of the pair. Volumes have rows if they were kept. The
+        prediction of a held-out view has rows of one region, ``all``, under that view's label. `answered` is the per
+        cent of the pixels that the value is over; it is 100 if missing answers count against a method.
     cells
-        Columns `CELL_COLUMNS`, one row for each cell that is scored: what became of it and what it cost. Of a cell
-        that is solved several times, `seconds` is the median, of those solves that nothing disturbed if there are
-        any, and the shortest and the longest stand beside it.
+        Columns `CELL_COLUMNS`, one row for each cell that is scored: how it ended and what it cost. If a cell is
+        solved several times, `seconds` is the median of the undisturbed solves, or of all if there are none. The
+        shortest and the longest of them are `seconds_least` and `seconds_most`.
     reliability
         The reliability curve of every volume that was kept, over the reference view's known truth: algorithm, params,
         scene, seed, and the columns of `matbench.measures.volume_metrics.reliability`.
     unsteady
         The cells whose repeats differ, a line each.
     outcomes
-        Key -> what became of each cell that is stored whole, repeats too.
+        Key -> outcome, for each cell that is stored whole, repeats included.
     """
 
     results: pd.DataFrame
@@ -171,12 +171,12 @@ class Tables:
 
 
 def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
-    """Score a run: every cell is read once, and its rows of all tables are made of that one reading.
+    """Score a run. Every cell is read only once, so that its rows in all tables belong to the same solve.
 
     Raises
     ------
     UserError
-        If a scene is not the one that the maps are of.
+        If a scene is not the one that was solved.
     """
     rows: list[tuple[object, ...]] = []
     lines: list[tuple[object, ...]] = []
@@ -200,7 +200,8 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
             rows += _scored(solved, scene)
             curves += _curve(solved, scene)
     cells = pd.DataFrame(lines, columns=list(CELL_COLUMNS))
-    nowhere = [name for name in _NUMBERS if cells[name].isna().all()]  # numbers nobody has are numbers all the same
+    # pandas would take a column without any number for one of objects; `read` takes it for one of numbers
+    nowhere = [name for name in _NUMBERS if cells[name].isna().all()]
     return Tables(
         pd.DataFrame(rows, columns=list(RESULT_COLUMNS)),
         cells.astype(dict.fromkeys(nowhere, float)),
@@ -211,7 +212,7 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
 
 
 def read(folder: Path, unsteady: tuple[str, ...], outcomes: Mapping[str, Outcome]) -> Tables:
-    """What `tables` gave when it was written to a run folder: the same types, and the same numbers to the last bit."""
+    """The tables as they lie in a run folder: the same types as `tables` gave, and the same numbers to the last bit."""
     return Tables(
         _read(folder / "results.csv", RESULT_COLUMNS, ("seed", "value", "pixels", "answered")),
         _read(folder / "cells.csv", CELL_COLUMNS, _NUMBERS),
@@ -224,7 +225,7 @@ def read(folder: Path, unsteady: tuple[str, ...], outcomes: Mapping[str, Outcome
 def _read(path: Path, columns: Sequence[str], numbers: Sequence[str]) -> pd.DataFrame:
     if not path.exists():
         return pd.DataFrame(columns=list(columns))
-    # a method may be called "nan"; and no parser of tables gives every number back to the last bit
+    # read as texts: a method may be called "nan", and the parser of pandas may change a number's last bit
     table = pd.read_csv(path, dtype=str, keep_default_na=False)
     return table.assign(**{name: [_number(text) for text in table[name]] for name in numbers})
 
@@ -245,7 +246,7 @@ def _scored(solved: Solved, scene: Scene) -> Iterator[tuple[object, ...]]:
 
 
 def _check_scene(solved: Solved, scene: Scene) -> None:
-    """Refuse to score maps against another scene than that which was solved."""
+    """Refuse to score maps against another scene than the one that was solved."""
     cell = solved.cell
     if scene.digest != cell.scene_digest:
         raise UserError(f"{cell.scene} is not what {cell.method} was given: it cannot be scored with the others")
@@ -308,7 +309,7 @@ def _curve(solved: Solved, scene: Scene) -> list[pd.DataFrame]:
 
 
 def _log_of(place: Path) -> str:
-    """Where a cell's log lies in the run folder, to stand after its reason; nothing if it has none."""
+    """A note where a cell's log lies, to follow its reason; empty if nothing was logged."""
     log = place / "log.txt"
     printed = log.is_file() and log.stat().st_size > 0
     return f" (log: cells/{place.name}/log.txt)" if printed else ""

@@ -1,4 +1,4 @@
-"""Where a run stands, seen from its folder alone, also while it runs."""
+"""The progress of a run, read from its folder alone; also while another process works on it."""
 
 import time
 from collections import Counter
@@ -17,26 +17,26 @@ from matbench.runs.store import Store
 
 @frozen
 class Standing:
-    """Where a run stands.
+    """The progress of a run.
 
     Parameters
     ----------
     cells
-        How many it has.
+        How many cells the plan has.
     counts
         Status -> how many cells ended so.
     running
-        The cells under way, and for how many seconds.
+        The cells under way, each with the seconds since it started.
     work
         Who works on it; None if nobody does.
     left
         How many cells are not done: under way, never computed, or not ended well.
     seconds_left
-        A rough guess from finished cells of the same methods; None if nothing is known of one.
+        A rough guess from finished cells of the same methods; None if some method has no finished cell.
     stale
-        How many stored cells are none of the plan's, such as those of code that was changed since.
+        How many stored cells do not belong to the plan, such as those of code that has changed since.
     stale_bytes
-        What these take.
+        How many bytes the stale cells take on the disk.
     tables
         Why the tables cannot be relied on; empty if they can.
     """
@@ -59,7 +59,7 @@ class Standing:
 
 
 def standing(folder: Path) -> Standing:
-    """Look at a run folder; nothing is written.
+    """Read the progress of a run from its folder. Nothing is written.
 
     Raises
     ------
@@ -73,6 +73,7 @@ def standing(folder: Path) -> Standing:
     now = time.time()
     begun = work.running if work else {}
     running = [(cell, max(0.0, now - begun[cell.key])) for cell in plan.cells if cell.key in begun]
+    # a cell that is solved once more still has the outcome of the time before
     undone = [cell for cell in plan.cells if cell.key in begun or not _is_done(outcomes[cell.key])]
     stale = store.stale(plan)
     return Standing(
@@ -90,7 +91,7 @@ def standing(folder: Path) -> Standing:
 
 
 def prune(folder: Path) -> int:
-    """Remove the stored cells that are none of the plan's; how many there were.
+    """Remove the stored cells that do not belong to the plan, and return how many there were.
 
     Raises
     ------
@@ -114,7 +115,7 @@ def _is_done(outcome: Outcome | None) -> bool:
 def _guess(
     plan: Plan, outcomes: Mapping[str, Outcome | None], undone: Sequence[Cell], spent: Mapping[str, float]
 ) -> float | None:
-    """Seconds left: each cell takes as long as those of its method, else of its algorithm, have taken."""
+    """Seconds left, if each cell takes the mean time of its method's finished cells, or else of its algorithm's."""
     took: dict[str, list[float]] = {}
     for cell in plan.cells:
         outcome = outcomes[cell.key]
@@ -127,4 +128,4 @@ def _guess(
         if known is None:
             return None
         total += max(0.0, mean(known) - spent.get(cell.key, 0.0))
-    return total / max(1, len(spent))
+    return total / max(1, len(spent))  # as many cells at once as run now

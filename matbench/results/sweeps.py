@@ -1,7 +1,7 @@
-"""Curves: error against an option of a scene, or a parameter of a method, that takes several numbers in one run.
+"""Curves of the error over a number that varies within one run: an option of scenes, or a parameter of a method.
 
-Within a sweep all else is equal. It is over the scenes in which every curve has every value, so
-that no point of a curve is a mean over easier scenes than another.
+Within a sweep all else is equal. Its means are over the scenes in which every curve has every value.
+Otherwise one point of a curve might be a mean over easier scenes than the next.
 """
 
 import re
@@ -20,10 +20,10 @@ from matbench.results.comparable import SILENT, counted, is_enough
 from matbench.spec import Spec
 
 LEAST_VALUES = 3
-"""Two values are a switch (`matbench.results.ablation`), not a curve."""
+"""A curve has at least so many values. Two values are a switch (`matbench.results.ablation`)."""
 
 REPEATS = ("ref", "seed")
-"""Options whose numbers are names: within a scene they are averaged over."""
+"""Options whose numbers are only names. They give no curves; results are averaged over them within a scene."""
 
 COLUMNS = (
     "algorithm",
@@ -46,7 +46,7 @@ COLUMNS = (
 
 @frozen(eq=False)
 class Sweep:
-    """One option's values and what they do.
+    """The curves over the values of one option.
 
     Parameters
     ----------
@@ -55,24 +55,25 @@ class Sweep:
     of
         The algorithm whose parameter it is; empty for an option of scenes.
     setting
-        What the other options of scenes are that vary in the run, as they are typed.
+        The values of all other scene options that vary in the run, as they are typed.
     values
         At least `LEAST_VALUES`, increasing.
     scenes
-        The scenes that means are over.
+        The scenes that the means are over.
     left_out
-        Scenes with these values that lack a result.
+        Scenes that have these values but lack a result.
     moving
-        Regions that hold other pixels at other values.
+        Regions whose number of pixels changes with the value.
     limits
-        Methods with a parameter of the same name as the scenes' option, less than the largest value.
+        Method -> its own parameter of the same name, where it is below the largest value. An example is a
+        method that uses at most 3 views, on scenes with ``views=2,3,5``.
     curves
-        Columns `COLUMNS`. `params` are those that differ from their defaults, without the option
-        itself. `mean` over scenes with its interval, NaN below `FEW` scenes; `change` is the paired
-        difference from the first value, with its interval and verdict as in
-        `matbench.measures.statistics.Effect`. `answered` is the per cent of the pixels that the mean is over; where
-        that is less than `matbench.measures.metrics.ENOUGH` at either end of a change, its verdict is `SILENT`. A
-        region counts on the scenes where it does so at every value (`matbench.results.comparable.counted`).
+        Columns `COLUMNS`. `params` are the parameters that differ from their defaults, without the option
+        itself. `mean` is over the scenes; `low` and `high` are its interval, NaN below `FEW` scenes. `change` is
+        the paired difference from the first value, with its interval and verdict as in
+        `matbench.measures.statistics.Effect`. `answered` is the per cent of the pixels that the mean is over. If it
+        is less than `matbench.measures.metrics.ENOUGH` at one of the two values, the verdict is `SILENT`. Only scenes
+        on which a region counts at every value are used for it (`matbench.results.comparable.counted`).
     """
 
     option: str
@@ -97,7 +98,7 @@ def is_swept(scenes: Iterable[Spec]) -> bool:
 
 
 def table(sweeps: Sequence[Sweep]) -> pd.DataFrame:
-    """All curves in one table, ``sweeps.csv``: the columns of `Sweep` before those of its curves."""
+    """All curves in one table, ``sweeps.csv``: the facts of each `Sweep`, then the columns of its curves."""
     parts = [
         sweep.curves.assign(
             option=sweep.option,
@@ -114,11 +115,11 @@ def table(sweeps: Sequence[Sweep]) -> pd.DataFrame:
 
 
 def sweeps(plan: Plan, results: pd.DataFrame) -> list[Sweep]:
-    """Every sweep of a run.
+    """All sweeps of a run.
 
-    Scenes with different values are compared in what they share: with 2, 3 and 5 views of one
-    scene and 2, 3, 5 and 7 of another there is a sweep of three values over both and one of four
-    over the other.
+    Scenes that have different values share a sweep over their common values. For example, one scene has
+    2, 3 and 5 views, another has 2, 3, 5 and 7. Then there is a sweep of three values over both scenes,
+    and a sweep of four values over the second scene.
 
     Parameters
     ----------
@@ -141,12 +142,12 @@ def sweeps(plan: Plan, results: pd.DataFrame) -> list[Sweep]:
 
 
 def _number(value: object) -> float:
-    """The number that an option's text or a parameter's value is; NaN if it is none."""
+    """An option's text or a parameter's value as a number; NaN if it is none."""
     return float(str(value)) if re.fullmatch(r"-?[0-9]{1,9}(\.[0-9]+)?(e-?[0-9]{1,2})?", str(value)) else nan
 
 
 def _cells(plan: Plan) -> pd.DataFrame:
-    """One row for each cell and each way in which its scene was asked for."""
+    """One row for each cell and each name by which its scene was asked for: two values may mean one scene."""
     spelled: dict[str, list[str]] = {cell.scene: [cell.scene] for cell in plan.cells}
     for name, kept in plan.spellings.items():
         spelled[kept].append(name)
@@ -160,7 +161,7 @@ def _cells(plan: Plan) -> pd.DataFrame:
 
 
 def _varying(cells: pd.DataFrame) -> set[str]:
-    """The options of scenes that are not the same whenever a scene is asked for."""
+    """The options that differ between two requests for the same scene."""
     found: set[str] = set()
     for _, options in cells.groupby("base")["options"]:
         names = set(chain.from_iterable(options))
@@ -225,13 +226,13 @@ def _moving(good: pd.DataFrame) -> tuple[str, ...]:
 
 
 def _limits(methods: Iterable[Method], option: str, largest: float) -> dict[str, float]:
-    """The methods whose own parameter of that name is set to less."""
+    """Method -> its own parameter of that name, if it is below the largest value; 0 means no limit."""
     own = {str(method): _number(method.params.get(option)) for method in methods}
     return {name: limit for name, limit in own.items() if 0 < limit < largest}
 
 
 def _without(method: Method, option: str) -> str:
-    """What a method's label says of its other parameters."""
+    """A method's label without one of its parameters."""
     return " ".join(part for part in method.changed.split() if part.partition("=")[0] != option)
 
 
@@ -246,7 +247,8 @@ def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.Dat
     shares = groups["answered"].mean().unstack("base")
     has = per_scene.notna().groupby(heads).transform("all")
     rows: list[tuple[object, ...]] = []
-    for known in set(map(tuple, has.to_numpy().tolist())):  # at most a few: all at once is much faster
+    # there are few different sets of scenes, and all rows of one set share a bootstrap: that is much faster
+    for known in set(map(tuple, has.to_numpy().tolist())):
         part = per_scene.loc[(has == list(known)).all(axis=1), list(known)]
         if part.shape[1]:  # else the region is empty
             over = shares.loc[part.index, part.columns].mean(axis=1)
@@ -260,12 +262,14 @@ def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.Dat
 
 
 def _lines(scores: pd.DataFrame, answered: pd.Series) -> list[tuple[object, ...]]:
-    """What `COLUMNS` say from `mean` on, for each row of curves by increasing values x scenes.
+    """The values of `COLUMNS` from `mean` on, for each row of `scores`.
 
     Parameters
     ----------
+    scores
+        One row for each curve and value, values increasing; one column for each scene.
     answered
-        Of each row, the per cent of the pixels that its scores are over.
+        Per cent of the pixels that the scores of each row are over.
     """
     numbers, count = scores.to_numpy(np.float64), scores.shape[1]
     curves = scores.groupby(["region", "metric", "unit", "curve"], sort=False)
