@@ -6,7 +6,7 @@ from matbench.files.own_folders import cache_folder
 
 
 def home() -> Path:
-    """The folder of all of them, below the person's folder for what can be made anew.
+    """The folder of all compiled kernels, inside the user's cache folder.
 
     Raises
     ------

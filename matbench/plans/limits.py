@@ -94,6 +94,7 @@ def isolation(value: object) -> str:
 
 def cores() -> int:
     """How many processor cores this process may use."""
+    # `cpu_count` also counts cores that a cluster or a container has not given to this process
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -102,7 +103,7 @@ def room() -> int:
     import psutil
 
     total = psutil.virtual_memory().total
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError):  # no container, or "max" for one without a limit
         total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
     return int(total * 0.9) // (1 << 20)
 

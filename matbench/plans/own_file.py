@@ -1,9 +1,9 @@
-"""Importing a user's own file, with what lies beside it.
+"""Importing a user's own file (a plug-in), together with the files beside it.
 
-``import helper`` in a plug-in means the file beside it, as in a script. But nobody else sees that file: the plug-in
-and its helpers are the modules of a package that is made up for them, and only their own imports look there first.
-So two folders may each have a ``helper.py``. The package is named after the code: once that has changed, it is
-another package, imported anew.
+In a plug-in, ``import helper`` means the file beside it, as in a script. No other module sees that file. The plug-in
+and its helpers become modules of an artificial package, and only the imports of these modules look there first. So
+two folders may each have a ``helper.py``. The package's name contains a digest of the code: changed code is another
+package, and is imported again.
 """
 
 import builtins
@@ -26,7 +26,7 @@ _PREFIX = "matbench_plugin_"
 
 
 def import_file(path: Path) -> ModuleType:
-    """A plug-in's module as its code is now.
+    """Import a plug-in as its code is now.
 
     Raises
     ------
@@ -48,13 +48,14 @@ def import_file(path: Path) -> ModuleType:
         sys.meta_path.insert(0, _Finder)
     importlib.invalidate_caches()
     if behind.parts.get("numba", code.NOT_THERE) != code.NOT_THERE:
-        importlib.import_module("numba")  # `_kernels_apart` has to be there first
+        importlib.import_module("numba")  # now: `_kernels_apart` can set its cache folder only if it is imported
     sys.modules[package] = _made_up(package, path.parent)
     try:
         return _imported(name, path)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # sys.exit included
+        # the next try must not find helpers that were imported by this one
         for one in [one for one in sys.modules if one.partition(".")[0] == package]:
             del sys.modules[one]
         raise UserError(f"plug-in file {str(path)!r}: {failure(error)}") from error
@@ -82,13 +83,14 @@ class _Loader(SourceFileLoader):
     """Runs a module that belongs to a plug-in."""
 
     def get_code(self, fullname: str) -> CodeType:
-        """From the source each time: the stamp of a compiled file misses a second edit within a second."""
+        """Compile the source each time: Python's compiled file misses a second edit within the same second."""
         path = self.get_filename(fullname)
         compiled: CodeType = self.source_to_code(self.get_data(path), path)
         return compiled
 
     def exec_module(self, module: ModuleType) -> None:
-        """Run it; its own import statements, those in functions too, look beside it first."""
+        """Run the module so that its import statements, also those in functions, look beside it first."""
+        # Python looks up `__import__` in the builtins of the importing module, at every import statement
         package = module.__name__.partition(".")[0]
         own = {**vars(builtins), "__import__": _Import(package, module.__name__)}
         module.__dict__["__builtins__"] = own
@@ -97,11 +99,11 @@ class _Loader(SourceFileLoader):
 
 
 class _Finder:
-    """Has modules of plug-ins run by `_Loader`."""
+    """Finds the modules of plug-ins, and has `_Loader` run them."""
 
     @classmethod
     def find_spec(cls, name: str, path: Sequence[str] | None = None, _: Any = None) -> ModuleSpec | None:
-        """Where Python would find it."""
+        """The module where Python would find it; None for modules of no plug-in."""
         if path is None or not name.startswith(_PREFIX):
             return None
         spec = PathFinder.find_spec(name, path)
@@ -127,6 +129,8 @@ class _Import:
         top = name.partition(".")[0]
         inside = f"{self.package}.{top}"
         folder = Path(sys.modules[self.package].__path__[0])
+        # Python's own way for a relative import, and for all that does not lie beside; a file never imports itself:
+        # ``import numpy`` in numpy.py means the library
         if level or self.module == inside or not code.lies_beside(folder, top):
             return builtins.__import__(name, globals, locals, fromlist or (), level)
         if fromlist:
@@ -137,9 +141,9 @@ class _Import:
 
 @contextmanager
 def _kernels_apart(package: str) -> Iterator[None]:
-    """Keep the kernels that numba compiles for each state of a plug-in's code.
+    """Give numba a cache folder of its own for each state of a plug-in's code.
 
-    It notices a change of a kernel's own file only, not of one that it calls in another.
+    numba notices a change of the file in which a kernel stands, but not of other files whose kernels it calls.
     """
     config: Any = getattr(sys.modules.get("numba"), "config", None)
     if config is None:

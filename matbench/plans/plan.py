@@ -13,7 +13,7 @@ from matbench.errors import UserError
 from matbench.plans import plugins
 from matbench.scene import Scene
 
-SCHEMA = 2  # of cells and their keys; a change of what is stored makes all of them anew
+SCHEMA = 2  # raised when what is stored changes: every key changes with it, so all cells are computed again
 
 
 def digest(value: Any) -> str:
@@ -32,7 +32,7 @@ class Method:
     params
         Every parameter with its value.
     changed
-        Only those that differ from their defaults, as text: how tables tell methods apart.
+        The parameters that differ from their defaults, as text. Tables tell methods apart by it.
     code
         SHA-256 of its code.
     """
@@ -55,7 +55,7 @@ class Cell:
     key
         Digest of everything that decides the answer; the name of the cell's folder.
     repeat
-        0 is the cell that is scored; others solve the same again, to see whether the maps are the same.
+        0 for the cell that is scored. The others solve the same again, to see whether the maps are the same.
     """
 
     method: Method
@@ -67,7 +67,7 @@ class Cell:
 
     @property
     def question(self) -> tuple[str, str, str, int, int]:
-        """What is asked, whatever the code and the pixels: algorithm, parameters, scene, seed and repeat."""
+        """What the cell asks, apart from code and pixels: algorithm, parameters, scene, seed and repeat."""
         params = json.dumps(dict(self.method.params), sort_keys=True)
         return self.method.algorithm, params, self.scene, self.seed, self.repeat
 
@@ -83,11 +83,11 @@ class Plan:
     Parameters
     ----------
     cells
-        What is to be computed.
+        The cells to compute.
     plugin_files
         The users' own files: methods, scenes and metrics.
     spellings
-        Other names by which scenes were asked for -> what they are called in the cells.
+        Name by which a scene was asked for -> its name in the cells, if these differ.
     """
 
     cells: tuple[Cell, ...]
@@ -101,7 +101,7 @@ class Plan:
 
     @property
     def questions(self) -> tuple[tuple[Cell, ...], ...]:
-        """The cells, those that repeat one another together: the one that is scored, then its repeats."""
+        """The cells in groups that ask the same: the cell that is scored, then its repeats."""
         found: dict[tuple[object, ...], list[Cell]] = {}
         for cell in self.cells:
             found.setdefault(cell.question[:-1], []).append(cell)
@@ -125,7 +125,7 @@ class Plan:
 
 
 def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[Method]:
-    """The methods that selectors mean, each once, parameters checked.
+    """The methods that the selectors name, each once, with checked parameters.
 
     Raises
     ------
@@ -140,6 +140,7 @@ def methods(selectors: str | Sequence[str], files: Sequence[Path] = ()) -> list[
         if not callable(getattr(instance, "solve", None)):
             raise UserError(f"{plugin.name} from {plugin.source} is no method: it has no solve(scene, context)")
         parameters.refuse_silent(plugin.name, instance, one.options)
+        # a method may have a parameter called preset; then the word names no set of parameters
         preset = one.options.get("preset") if "preset" not in parameters.parameters(type(instance)) else None
         changed = spec.text(parameters.changed(instance, preset))
         params = parameters.values_of(instance)
@@ -163,6 +164,7 @@ def make_plan(
             for seed in seeds:
                 facts = [SCHEMA, method.algorithm, dict(method.params), method.code, name, scene.digest, seed]
                 for repeat in range(repeats):
+                    # the first has the key of a cell without repeats: whoever asks for repeats later keeps it
                     key = digest([*facts, repeat] if repeat else facts)
                     cells.append(Cell(method, name, scene.digest, seed, key, repeat))
     return Plan(tuple(cells), tuple(str(path) for path in files), spellings or {})

@@ -137,7 +137,7 @@ def own_metrics(path: Path) -> tuple[Any, ...]:
 
 
 def _metrics_in(module: ModuleType) -> tuple[Any, ...]:
-    """What looks like a metric; whoever scores sees whether it is one."""
+    """Whatever looks like a metric; `matbench.results.scores.metrics` checks that it is one."""
     public = [value for name, value in vars(module).items() if not name.startswith("_")]
     every = [one for value in public for one in (value if isinstance(value, list | tuple) else [value])]
     kinds = [one for one in every if not isinstance(one, type) and callable(getattr(one, "compute", None))]
@@ -155,10 +155,10 @@ _used: ContextVar[tuple[Path, ...]] = ContextVar("plug-in files", default=())
 
 @contextmanager
 def using(files: Iterable[str | Path]) -> Iterator[None]:
-    """Have scenes and metrics of users' own files found as the installed ones are, as long as the block lasts.
+    """Within the block, datasets and metrics in users' own files are found by name, as installed ones are.
 
-    They are loaded by name in many places, in other processes, too. Methods need no such block: whoever looks for
-    them names the files.
+    They are looked up in many places, also in other processes. Methods need no such block: their callers pass the
+    files.
 
     Raises
     ------
@@ -167,14 +167,14 @@ def using(files: Iterable[str | Path]) -> Iterator[None]:
     """
     token = _used.set(tuple(dict.fromkeys(Path(file).resolve() for file in files)))
     try:
-        datasets()
+        datasets()  # a file that cannot be used is an error here, not somewhere within the block
         yield
     finally:
         _used.reset(token)
 
 
 def used() -> tuple[Path, ...]:
-    """The files of the block that `using` has begun."""
+    """The files of the innermost block of `using`; none outside of any."""
     return _used.get()
 
 
@@ -216,7 +216,7 @@ def algorithm(name: str, files: Iterable[Path] = ()) -> Plugin:
 
 
 def code_of(plugin: Plugin) -> Code:
-    """All code behind a plug-in as it is now: what its module imports, whatever the module does with it.
+    """All code that a plug-in depends on, as it is now: its module and all that this imports.
 
     Raises
     ------
@@ -232,8 +232,8 @@ def code_of(plugin: Plugin) -> Code:
 
 
 def read_ahead(name: str, files: Iterable[str]) -> None:
-    """Read the code of a method, and run none of it: processes forked from this one have it read already."""
-    with suppress(OSError):  # whoever needs it is told so
+    """Read the code of a method without running it. Processes that are forked from this one need not read it again."""
+    with suppress(OSError):  # a file that cannot be read is reported where it is needed
         for file in files:
             code.of_file(Path(file))
     if (plugin := installed("algorithms").get(name)) is not None:
@@ -247,7 +247,7 @@ def code_digest(plugin: Plugin) -> str:
 
 
 def declared(name: str, instance: object) -> list[Path]:
-    """The files that a method says it `reads`.
+    """The files that a method declares in its attribute `reads`.
 
     Raises
     ------
@@ -267,7 +267,7 @@ def declared(name: str, instance: object) -> list[Path]:
 
 
 def method_digest(plugin: Plugin, instance: object) -> str:
-    """`code_digest`, and the content of the files that the method reads: parameters that are paths, and `declared`.
+    """Digest of a method: of its code, and of the files it reads (parameters that are paths, and `declared` ones).
 
     Raises
     ------
@@ -288,10 +288,10 @@ def method_digest(plugin: Plugin, instance: object) -> str:
 
 
 def kernel_cache() -> Path:
-    """Where compiled kernels are kept: a folder for each state of the code of the installed methods that have some.
+    """The folder of compiled kernels: another one for each state of the code of all installed methods with kernels.
 
-    numba notices a change of a kernel's own file, by its time and size, but not of one that it calls in another. So
-    it is enough, and needed, that a change of what code does makes another folder; a comment does not.
+    numba notices a change of the file in which a kernel stands, by time and size, but not of other files whose kernels
+    it calls. Therefore any change of what the code does leads to another folder. A changed comment does not.
     """
     every = [code_of(plugin) for _, plugin in sorted(installed("algorithms").items())]
     digests = [one.digest for one in every if "numba" in one.parts]
@@ -299,13 +299,13 @@ def kernel_cache() -> Path:
 
 
 def default_algorithms() -> list[str]:
-    """All built-in methods that need not be told anything."""
+    """The built-in methods without required parameters."""
     built_in = [p for p in installed("algorithms").values() if p.source == "matbench-stereo"]
     return [p.name for p in built_in if not parameters.required(p.load())]
 
 
 def groups(algorithm: str) -> dict[str, str]:
-    """Parameter -> group of an installed method; of another none: what a run folder names is not executed."""
+    """Parameter -> its group, for an installed method; empty for others, because code that a run names is not run."""
     plugin = installed("algorithms").get(algorithm)
     try:
         known = {} if plugin is None else parameters.parameters(plugin.load())

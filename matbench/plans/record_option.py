@@ -79,7 +79,7 @@ class RecordOption:
         Raises
         ------
         ValueError
-            If the scene has not all the rows.
+            If the scene lacks one of the rows.
         """
         for row in self.rows:
             if not 0 <= row < height:

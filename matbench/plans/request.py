@@ -32,7 +32,7 @@ def read_request(path: Path) -> tuple[list[str], list[str] | None]:
 
 
 def seeds_of(seed: object) -> list[int]:
-    """One seed or several, each once.
+    """The seeds of a request as a list, each once.
 
     Raises
     ------
@@ -41,6 +41,7 @@ def seeds_of(seed: object) -> list[int]:
     """
     given = list(seed) if isinstance(seed, list | tuple | range) else [seed]
     try:
+        # `index` takes numpy's whole numbers, too, but no 1.0
         found = [operator.index(one) for one in given if not isinstance(one, bool)]  # type: ignore[arg-type]
     except TypeError:
         found = []

@@ -44,8 +44,8 @@ class Settings:
         The address of the Dask scheduler that hands out the cells; ``"local"`` for a cluster of `jobs`
         workers on this machine; None for no cluster.
     steady
-        Solve those cells once more, one at a time and at the end, whose seconds are in doubt because others took the
-        processors meanwhile. Not with `dask`.
+        At the end, solve the cells again whose seconds are in doubt because others took the processors meanwhile.
+        These run one at a time. Not with `dask`.
 
     Raises
     ------
