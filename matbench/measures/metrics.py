@@ -15,18 +15,19 @@ from matbench.scene import Scene
 
 Errors = NDArray[np.float64]
 Better = Literal["lower", "higher", "zero"]
-"""Which numbers are better: lower ones, higher ones, or those that are nearer to zero."""
+"""Which values are better: lower ones, higher ones, or those nearer to zero."""
 
 ENOUGH = 90.0
-"""Per cent of the pixels. Who answers less is not ranked by a metric over answered pixels: silence must not win."""
+"""Per cent of the pixels. A method that answers less is not ranked by metrics over answered pixels: otherwise it could
+win by leaving out the hard ones."""
 
 TIE = 1e-4
-"""Px. An error this little above a threshold is a tie, and a tie is not bad."""
+"""Px. An error that is above a threshold by no more than this is a tie, and a tie is not bad."""
 
 
 @frozen
 class Metric:
-    """A number for the pixels of a region, and in words what it is.
+    """A number for the pixels of a region, and a description of it.
 
     Parameters
     ----------
@@ -35,12 +36,12 @@ class Metric:
     unit
         ``"%"`` of the region's pixels, ``"px"`` of the field's pair, or empty for a plain number.
     better
-        ``"lower"``, ``"higher"``, or ``"zero"`` for a signed number, of which what is nearer to zero is better.
+        Which values are better: ``"lower"``, ``"higher"``, or, for a signed number, those nearer to ``"zero"``.
     about
-        What it is, in one line.
+        A description in one line.
     compute
-        What `takes` says, of at least one pixel -> the value; NaN where it has none. It must not write to its
-        argument.
+        Function from what `takes` names, for at least one pixel, to the value; NaN if there is none. It must not
+        write to its argument.
     takes
         ``"absolute"``: (pixels,) float64 absolute errors in px of the pair, NaN where the method has no answer.
         ``"signed"``: the same with their signs, estimate less truth: positive is too near.
@@ -49,8 +50,8 @@ class Metric:
         A `MapInRegion` of all pixels with known truth -> (H, W) numbers in `unit`, NaN where there is nothing to
         show: what ``matbench figure maps --metric`` draws. None if there is nothing to look at.
     answered_only
-        Is it over answered pixels only, so that silence does not count against a method? Then who answers fewer
-        than `ENOUGH` is not ranked by it. To be on the safe side, it is unless said otherwise.
+        True if only answered pixels enter, so that missing answers do not count against a method. Then a method that
+        answers less than `ENOUGH` is not ranked by the metric. True by default, to be on the safe side.
     """
 
     name: str
@@ -67,7 +68,7 @@ class Metric:
 
 @frozen(eq=False)
 class MapInRegion:
-    """A whole disparity map, and the region in which it is judged: what a spatial metric is given. Read-only.
+    """The argument of a spatial metric: a whole disparity map, and the region in which it is scored. Read-only.
 
     Parameters
     ----------
@@ -255,7 +256,7 @@ def score(
 
 
 def map_in_region(scene: Scene, estimate: NDArray[np.float32], mask: NDArray[np.bool_]) -> MapInRegion:
-    """What a metric of the whole map is given; of the mask, the pixels with known truth."""
+    """The argument of a spatial metric. Of `mask`, the pixels with known truth are taken."""
     arrays = np.where(np.isfinite(estimate), estimate, np.float32(np.nan)), mask & np.isfinite(scene.truth[scene.ref])
     for array in arrays:
         array.setflags(write=False)
@@ -263,7 +264,7 @@ def map_in_region(scene: Scene, estimate: NDArray[np.float32], mask: NDArray[np.
 
 
 def value_of(metric: Any, argument: Any, pixels: int) -> float:
-    """A metric's value; NaN for an empty region, and for a plug-in's metric that fails: it harms no other."""
+    """A metric's value; NaN for an empty region or a metric that fails: a faulty plug-in must not stop the others."""
     if not pixels:
         return float("nan")
     try:

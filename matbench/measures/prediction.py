@@ -1,9 +1,9 @@
 """Prediction of an end view that the method was not given: a protocol that needs no ground truth.
 
-The reference view is carried into the withheld one by the estimated disparities; what comes out
-is compared with what the camera saw (Szeliski 1999, "Prediction error as a quality metric for
-motion and stereo"). As for answers, there are two numbers, never one: how good the prediction is
-where there is one, and how much of the view that is.
+The estimated disparities warp the reference view to the withheld one, and the result is compared with
+what the camera saw (Szeliski 1999, "Prediction error as a quality metric for motion and stereo").
+There are always two numbers: how good the prediction is where there is one, and how much of the view
+is predicted.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from matbench.scene import HeldOut, NotInScene, Scene
 
 ENDS = ("left", "right")
 BEST = 100.0
-"""dB, given where there is no difference at all."""
+"""Largest PSNR that is given, in dB: without any difference it would be infinite."""
 
 Differences = NDArray[np.float64]
 
@@ -33,8 +33,8 @@ class PredictionMetric:
     name, unit, better, about, answered_only
         As for `matbench.measures.metrics.Metric`; what is not predicted is not answered.
     compute
-        (pixels, 3) differences in grey levels, NaN where nothing is predicted -> the value; NaN
-        where it has none. It must not write to its argument.
+        Function from (pixels, 3) differences in grey levels, NaN where nothing is predicted, to the value;
+        NaN if there is none. It must not write to its argument.
     """
 
     name: str
@@ -46,7 +46,7 @@ class PredictionMetric:
 
 
 def predictable(scene: Scene) -> tuple[str, ...]:
-    """The ends of a scene that `hold_out` can take: not the reference view, and two views must be left."""
+    """The ends that `hold_out` accepts for a scene: the reference view must stay, and at least two views."""
     ends = {"left": 0, "right": scene.n - 1}
     return tuple(end for end, index in ends.items() if index != scene.ref) if scene.n > 2 else ()
 
@@ -63,8 +63,8 @@ def hold_out(scene: Scene, end: str) -> Scene:
     Raises
     ------
     UserError
-        If `end` is neither ``left`` nor ``right``, that is the reference view, or fewer than two
-        views would be left.
+        If `end` is neither ``left`` nor ``right``, if that view is the reference view, or if fewer than
+        two views would be left.
     """
     if end not in ENDS:
         raise unknown(f"view to predict of {scene.name}", end, ENDS)
@@ -81,10 +81,10 @@ def hold_out(scene: Scene, end: str) -> Scene:
 
 
 def predict(view: NDArray[np.uint8], disparity: NDArray[np.float32], steps: float) -> NDArray[np.float64]:
-    """What a view looks like from another one.
+    """Predict another view from one view and its disparities.
 
-    The disparities are carried there with a z-buffer (`carry`); each pixel that they reach takes
-    its colour from where it comes from, linear between pixels.
+    `carry` warps the disparities to the other view. Every pixel that has a disparity there takes its
+    colour from the matching place in the given view, interpolated linearly.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def predict(view: NDArray[np.uint8], disparity: NDArray[np.float32], steps: floa
 
 
 def differences(scene: Scene, disparity: NDArray[np.float32]) -> Differences:
-    """(pixels, 3) of the held-out view: predicted less seen, grey levels, NaN where nothing is predicted.
+    """(pixels, 3) predicted minus seen grey levels of the held-out view; NaN where nothing is predicted.
 
     Its black borders are left out (`picture_columns`; 25 columns in the outermost views of Teddy).
     """

@@ -10,12 +10,12 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 FEW = 6
-"""Fewer scenes than these carry no conclusion: even if all agreed in sign, chance does so in 1 of 16 runs."""
+"""With fewer scenes there is no verdict: even if all five agree in sign, chance alone does that once in 16 runs."""
 
 CONFIDENCE = 0.95
 
 EXACT = 7
-"""Up to so many scenes every resample is taken, 7**7 of them; for more, `_RESAMPLES` are drawn."""
+"""Up to this many scenes all resamples are taken (7**7 of them); for more scenes `_RESAMPLES` are drawn."""
 
 _RESAMPLES = 4999
 _BATCH = 256  # rows at once: bounds the memory that many take
@@ -76,7 +76,7 @@ def paired_effects(rows: Sequence[Sequence[float] | NDArray[np.float64]]) -> lis
 
 
 def settled(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Differences, or scores, without the last bits, which hang on the order of the sums that they come from.
+    """Differences, or scores, without their last bits, which depend on the order in which sums were taken.
 
     Parameters
     ----------
@@ -118,7 +118,8 @@ def intervals(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
         (..., scenes) float64, at least two scenes, all finite.
     """
     scenes = values.shape[-1]
-    # one order and one sign for all that ask for the same interval: draws are by place, and sums round
+    # Sums round, and scenes are drawn by their place. So that the order of the scenes and the sign of the differences
+    # do not matter, each row is brought into one order and one sign first.
     rows = np.sort(values.reshape(-1, scenes), axis=1)
     turned = -rows[:, ::-1]
     first = (rows != turned).argmax(axis=1)[:, None]
@@ -156,7 +157,7 @@ def _percentiles(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _means(rows: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(rows, resamples): their means, added scene by scene: a product of matrices rounds as its size pleases."""
+    """(rows, resamples) means. They are summed scene by scene: how a matrix product rounds depends on its size."""
     means = np.zeros((len(rows), len(shares)))
     for values, share in zip(rows.T, shares.T, strict=True):
         means += values[:, None] * share
@@ -165,7 +166,7 @@ def _means(rows: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np
 
 @cache
 def _draws(scenes: int) -> NDArray[np.float64]:
-    """(`_RESAMPLES`, scenes): how much of each drawn resample each scene is."""
+    """(`_RESAMPLES`, scenes) share of each scene in each drawn resample."""
     draws = np.random.default_rng(0).integers(0, scenes, (_RESAMPLES, scenes))
     share = np.zeros((_RESAMPLES, scenes))
     np.add.at(share, (np.arange(_RESAMPLES)[:, None], draws), 1 / scenes)
@@ -174,7 +175,7 @@ def _draws(scenes: int) -> NDArray[np.float64]:
 
 @cache
 def _all_resamples(scenes: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """(resamples, scenes) how much of each each scene is, and in how many orders it can be drawn; orders do not count.
+    """All resamples apart from order: (resamples, scenes) share of each scene, and (resamples,) how many orders.
 
     >>> _all_resamples(2)[0].tolist(), _all_resamples(2)[1].tolist()
     ([[1.0, 0.0], [0.5, 0.5], [0.0, 1.0]], [1, 2, 1])
@@ -186,9 +187,9 @@ def _all_resamples(scenes: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
 
 
 def median_interval(values: NDArray[np.float64]) -> tuple[float, float, float]:
-    """The median, and the order statistics around it that hold the true one with `CONFIDENCE` or more.
+    """The median, and two values around it that enclose the true median with probability `CONFIDENCE` or more.
 
-    Whatever the distribution, the number of values below its median is binomial.
+    This holds for any distribution, because the number of values below its median is binomial.
     """
     from scipy.stats import binom
 

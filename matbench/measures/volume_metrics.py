@@ -1,7 +1,7 @@
 """Scores of a volume along the rays of the reference view, where the truth of a ray is known.
 
-In front of the true surface a ray is empty; what lies behind it nobody knows, and it does not
-count. Distances are in planes of the volume, whose number is the method's own choice.
+A ray is empty in front of the true surface. What lies behind the surface is unknown and does not count.
+Distances are in planes of the volume; how many planes there are is the method's choice.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from matbench.measures.metrics import TIE
 from matbench.measures.volumes import Rays
 
 BINS = 10
-"""Of materiality from 0 to 1, for calibration."""
+"""How many bins divide materialities from 0 to 1, for calibration."""
 
 
 @frozen
@@ -29,9 +29,10 @@ class VolumeMetric:
     name, unit, better, about
         As for `matbench.measures.metrics.Metric`; the unit is ``"%"``, or empty for a plain number.
     answered_only
-        Is it over rays with a material point only, as `told` counts them?
+        True if only rays with a material point enter (those that `told` counts).
     compute
-        `Rays`, at least one -> the value; NaN where it has none. It must not write to its argument.
+        Function from `Rays`, at least one of them, to the value; NaN if there is none. It must not write to its
+        argument.
     """
 
     name: str
@@ -53,12 +54,14 @@ def _right_and_wrong(rays: Rays, tolerance: float) -> tuple[NDArray[np.bool_], N
 
 
 def told(rays: Rays) -> float:
-    """Per cent of the rays that have a material point (1/2 or more) not behind the surface by more than a plane."""
+    """Per cent of the rays that answer: with a material point (1/2 or more) at most one plane behind the surface."""
     return 100 * float((_material(rays) & (rays.before_surface >= -1 - TIE)).any(axis=1).mean())
 
 
 def precision(rays: Rays, tolerance: float) -> float:
-    """Per cent of the material points (1/2 or more) not behind the surface that lie near it; NaN if there are none.
+    """Of the material points near or in front of the surface, the per cent that are near; NaN if there are none.
+
+    A point is material from 1/2 on, and near within `tolerance` planes.
 
     After Knapitsch et al. 2017, "Tanks and temples", with planes along a ray for distances.
     """
@@ -79,7 +82,7 @@ def f_score(rays: Rays, tolerance: float) -> float:
 
 
 def outcomes(rays: Rays) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """(points,) materialities from the surface forward, and whether each is in the surface's nearest plane."""
+    """(points,) materialities on and in front of the surface, and whether each point is in the surface's plane."""
     nearest = np.round(rays.surface)[:, None]
     plane = np.arange(rays.materiality.shape[1])
     known = plane >= nearest
@@ -93,7 +96,7 @@ def brier(rays: Rays) -> float:
 
 
 def reliability(rays: Rays) -> pd.DataFrame:
-    """How often there is a surface where the materiality says so.
+    """The reliability curve: how often the surface is where the materialities predict it.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Volumes as a run keeps them: 256 levels, and read along the rays of a view."""
+"""Volumes as a run stores them: rounded to 256 levels, and read along the rays of a view."""
 
 import zipfile
 from collections.abc import Iterable, Iterator
@@ -90,7 +90,7 @@ class StoredVolume:
         return self.space.in_view(self.levels, self.views.index(view)).astype(np.uint8, copy=False)
 
     def true_planes(self, scene: Scene) -> NDArray[np.float64]:
-        """(H, W) where among the planes the reference view's truth lies, fractional; NaN where unknown."""
+        """(H, W) plane index of the reference view's true disparity, fractional; NaN where it is unknown."""
         step = self.views[1] - self.views[0]
         truth = scene.truth[scene.ref].astype(np.float64)
         return truth * (step * self.space.fineness) - self.space.first
@@ -108,7 +108,7 @@ class Rays:
     materiality
         (rays, planes) float32 from 0 to 1, plane 0 the farthest.
     surface
-        (rays,) float64 true place among the planes, fractional.
+        (rays,) float64 plane index of the true surface, fractional.
     """
 
     materiality: NDArray[np.float32]
@@ -116,13 +116,13 @@ class Rays:
 
     @cached_property
     def before_surface(self) -> NDArray[np.float64]:
-        """(rays, planes) planes by which each point lies before the true surface; negative behind it."""
+        """(rays, planes) how far each point lies in front of the true surface, in planes; negative behind it."""
         places: NDArray[np.float64] = np.arange(self.materiality.shape[1]) - self.surface[:, None]
         return places
 
 
 def rays_of(stored: StoredVolume, scene: Scene, masks: Iterable[NDArray[np.bool_]]) -> Iterator[Rays]:
-    """Region by region, the rays of the reference view's pixels where truth is known."""
+    """For each region, the rays of the reference view's pixels with known truth."""
     surface = stored.true_planes(scene)
     levels = np.ascontiguousarray(stored.rays(scene.ref).transpose(0, 2, 1))
     for mask in masks:

@@ -1,22 +1,22 @@
-"""Between two views by disparities: a map carried into another view, and another view's colours brought back."""
+"""Warping between two views by disparities: a disparity map to another view, and another view's colours back."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 TEAR = 1.0
-"""Px in the other view by which two neighbours may differ and still be one surface. Where they
-differ by more, the surface is torn and what lies behind may show through."""
+"""Px in the other view. Two neighbours belong to one surface if their shifts differ by no more than this. Otherwise
+the surface is torn, and what lies behind it may show through."""
 
 _ROUNDING = 1e-4  # px: float32 rounding does not decide a tie
 
 
 def carry(disparity: NDArray[np.float32], steps: float) -> NDArray[np.float64]:
-    """What the surface of one view looks like from another one.
+    """Warp a disparity map to another view, with a z-buffer.
 
-    A pixel at column x goes to ``x - steps * disparity``. Two neighbours in a row that are one
-    surface (`TEAR`) cover every column between them, linear in disparity, so that a surface that
-    widens leaves no holes; at a tear, or beside an unknown pixel, a pixel covers the column
-    nearest to it. Where several surfaces meet, the nearest counts.
+    A pixel at column x goes to ``x - steps * disparity``. Two neighbours in a row that belong to one
+    surface (`TEAR`) cover every column between them, with disparities interpolated linearly, so that a
+    surface that widens leaves no holes. At a tear, or beside an unknown pixel, a pixel covers only the
+    nearest column. Where several surfaces cover a column, the nearest one counts.
 
     Parameters
     ----------
@@ -61,16 +61,16 @@ def carry(disparity: NDArray[np.float32], steps: float) -> NDArray[np.float64]:
 
 
 def picture_columns(image: NDArray[np.uint8]) -> tuple[int, int]:
-    """The first and the last column that is not black from top to bottom: rectified views may end before their frame.
+    """The first and the last column that are not all black: rectified views may have black borders.
 
-    Of an image that is all black, all of it.
+    For an image that is all black, the first and the last column of all.
     """
     lit = np.flatnonzero(image.any(axis=(0, 2)))
     return (int(lit[0]), int(lit[-1])) if len(lit) else (0, image.shape[1] - 1)
 
 
 def warped(image: NDArray[np.uint8], disparity: NDArray[np.float32], steps: int) -> NDArray[np.float32]:
-    """What the reference view would look like, made from the colours of a view `steps` to the right of it.
+    """The reference view, reconstructed from the colours of the view that is `steps` to its right.
 
     Parameters
     ----------
