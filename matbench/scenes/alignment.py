@@ -1,9 +1,9 @@
 """Where views were taken, measured from the images alone: their order, spacing and rows.
 
-Features of the reference view are found again in every other view (SIFT, Lowe 2004; ratio test and
-agreement both ways). A point moves along its row by ``-(j - r) d``; so the movements towards two
-views are proportional, and their ratio tells how far apart these were taken. It must not move
-across rows.
+Features of the reference view are matched in every other view (SIFT, Lowe 2004; ratio test and
+agreement both ways). From reference view r to view j, a point of disparity d moves along its row by
+``-(j - r) d``. So the movements to two views are proportional, and their ratio is the ratio of the two
+baselines. A point must not move across rows.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,28 +12,28 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-ENOUGH = 12  # matches; with fewer nothing is said
+ENOUGH = 12  # matches; with fewer, nothing is measured
 RATIO = 0.7  # best over second-best distance
 PIXELS = 1_500_000  # larger views are made smaller first
 _FEATURES = 3000
 _TALLEST = 0.06  # of the height: what moves further across rows is no match
-_LEAST_MOVE = 0.5  # px; ratios of less are noise
+_LEAST_MOVE = 0.5  # px; ratios of smaller movements are noise
 _TRIM = 2.5  # deviations
 _AGREE = 0.75  # px per view step, between views
 
 
 @frozen(eq=False)
 class Matches:
-    """Points of the reference view and where another view has them.
+    """Features of the reference view, matched in one other view.
 
     Parameters
     ----------
     indices
-        (N,) which features of the reference view these are.
+        (N,) indices of the features of the reference view.
     points
-        (N, 2) columns and rows there.
+        (N, 2) their columns and rows in the reference view, px.
     across, down
-        (N,) columns to the right and rows down, in pixels.
+        (N,) how far they move to the right and down, towards the other view, px.
     """
 
     indices: NDArray[np.intp]
@@ -46,7 +46,7 @@ class Matches:
 
 
 def match(views: NDArray[np.uint8], ref: int) -> Mapping[int, Matches]:
-    """The features of view `ref` in all others.
+    """Match the features of view `ref` in all other views.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def match(views: NDArray[np.uint8], ref: int) -> Mapping[int, Matches]:
 
 
 def _mutual(a: NDArray[np.float32], b: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs of descriptors that choose each other, clearly before any other."""
+    """Indices of pairs of descriptors that are each other's best match, and clearly better than the second best."""
     if len(a) < 2 or len(b) < 2:
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
     squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1)[None] - 2 * a @ b.T
@@ -99,15 +99,15 @@ def _mutual(a: NDArray[np.float32], b: NDArray[np.float32]) -> tuple[NDArray[np.
 
 @frozen
 class Rows:
-    """How the rows of a view lie against those of the reference view.
+    """Vertical misalignment of a view against the reference view.
 
     Parameters
     ----------
     offset
-        By how much its points lie lower, in their middle, px.
+        How much lower the points of the view lie, at the middle of all matches, px.
     worst
-        The largest misalignment anywhere between the points, px: of a plane fitted to them, so that
-        turned and scaled views are told from false matches.
+        The largest misalignment within the area of the matches, px. It is taken from a plane fitted to
+        them: so rotated or scaled views count, but single false matches do not.
     """
 
     offset: float
@@ -115,7 +115,7 @@ class Rows:
 
 
 def rows(matches: Matches) -> Rows | None:
-    """Vertical misalignment of a view; None with too few matches."""
+    """Measure the vertical misalignment of a view; None with too few matches."""
     if len(matches) < ENOUGH:
         return None
     centred = matches.points - matches.points.mean(axis=0)
@@ -139,13 +139,13 @@ def _deviation(values: NDArray[np.float64]) -> float:
 def places(matches: Mapping[int, Matches], count: int, ref: int) -> NDArray[np.float64] | None:
     """Where each view was taken, in view steps from the reference view; from the images alone.
 
-    Only ratios can be measured: the mean step between views in their true order is 1, and the sign
-    is that of the given order.
+    Only ratios of baselines can be measured. So the unit is the mean step between neighbours, and the
+    sign is chosen to agree with the given order of the views.
 
     Returns
     -------
-    (count,) places, 0 for the reference view; NaN for a view with too few matches. None if nothing
-    can be told.
+    (count,) places, 0 for the reference view; NaN for a view with too few matches. None if no view has
+    enough.
     """
     moves = _moves(matches, count)
     known = [view for view in range(count) if np.isfinite(moves[view]).any()]
@@ -165,10 +165,10 @@ def places(matches: Mapping[int, Matches], count: int, ref: int) -> NDArray[np.f
 
 
 def _moves(matches: Mapping[int, Matches], count: int) -> NDArray[np.float64]:
-    """(count, features) pixels to the right by which each feature moves towards each view; NaN where unmatched.
+    """(count, features) how far each feature moves to the right towards each view, px; NaN where unmatched.
 
-    A view with too few matches has none. What moves several times as far as most is taken for a
-    false match: a repeated pattern.
+    A view with too few matches gets no numbers. A feature that moves several times as far as most is
+    taken for a false match, such as of a repeated pattern.
     """
     features = 1 + max((int(found.indices.max()) for found in matches.values() if len(found)), default=-1)
     moves = np.full((count, features), np.nan)
@@ -186,9 +186,9 @@ def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) 
 
 
 def disparities(matches: Mapping[int, Matches], steps: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """Disparities of the matched features, pixels per view step, each once.
+    """Disparities of the matched features, pixels per view step; one for each feature.
 
-    Where there are three views or more, only of features on which two of them agree.
+    If two or more other views are usable, a feature counts only if two of them agree on its disparity.
 
     Parameters
     ----------

@@ -24,22 +24,22 @@ DATA_VARIABLE = "MATBENCH_DATA"
 PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
 SYNTHETIC_SCENES = ("synthetic/box", "synthetic/curved", "synthetic/weak")
 GROUPS = {"paper": PAPER_SCENES}
-"""What a selector may name instead of a pattern."""
+"""Words that stand for several scenes in a selector, as a pattern does."""
 
 _NO_TRUTH = "no ground truth"
 
 
 OWN = "folder"
-"""The dataset that loads a scene from the folder of a path; every name that is a path is its."""
+"""The dataset that loads a scene from a folder. Every scene whose name is a path belongs to it."""
 
 
 def data_root(data: str | Path | None = None) -> Path | None:
-    """The folder of real scenes: `data`, else what MATBENCH_DATA names, else the person's own if it exists.
+    """The folder of real scenes: `data`, else what MATBENCH_DATA names, else the user's data folder if it exists.
 
     Raises
     ------
     UserError
-        If it is named but is no folder.
+        If it is named but does not exist.
     """
     named = data or os.environ.get(DATA_VARIABLE) or None
     if named is None:
@@ -55,10 +55,10 @@ def data_root(data: str | Path | None = None) -> Path | None:
 
 
 def own_folder(name: str) -> str | None:
-    """The folder that a scene's name means, as it is always written; None if it names no folder.
+    """The folder that a scene's name means, in its one spelling; None if the name means no folder.
 
-    A path begins with ``/``, ``.`` or ``~``, or is one that exists and no DATASET/SCENE; written as
-    ``folder/PATH`` it is a path in any case. A relative path is written as ``./PATH`` or ``../PATH``.
+    A name is a path if it begins with ``/``, ``.`` or ``~``, or if it is an existing folder and not
+    DATASET/SCENE. ``folder/PATH`` is always a path. In the result, a relative path is ``./PATH`` or ``../PATH``.
     """
     prefix, _, rest = name.partition("/")
     if prefix == OWN and rest:
@@ -83,7 +83,7 @@ def _dataset(prefix: str) -> Dataset:
 
 
 def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
-    """Every known scene by its full name; a dataset that cannot be imported by its error."""
+    """Full name -> listing, for every known scene. A dataset that cannot be imported has its error under its name."""
     root = data_root(data)
     found: dict[str, Listing | UserError] = {}
     for prefix, plugin in plugins.datasets().items():
@@ -98,7 +98,15 @@ def listings(data: str | Path | None = None) -> dict[str, Listing | UserError]:
 
 @frozen
 class Selection:
-    """Names of scenes, and why -> which others a pattern means but cannot have."""
+    """The scenes that selectors mean.
+
+    Parameters
+    ----------
+    names
+        Names of scenes, with their options.
+    left_out
+        Reason -> scenes that a pattern matches but that cannot be used.
+    """
 
     names: tuple[str, ...]
     left_out: Mapping[str, Sequence[str]] = {}
@@ -110,22 +118,22 @@ def is_pattern(name: str) -> bool:
 
 
 def group(name: str, known: Iterable[str]) -> list[str]:
-    """The names that a pattern, or a name of several scenes such as ``paper``, means."""
+    """The known scenes that a pattern, or a word such as ``paper``, stands for."""
     if name in GROUPS:
         return [one for one in GROUPS[name] if one in set(known)]
     return [one for one in known if fnmatchcase(one, name)]
 
 
 def select(selectors: str | Iterable[str], data: str | Path | None = None, needs_truth: bool = True) -> Selection:
-    """The scenes that selectors mean; patterns match scenes that are present and have truth.
+    """The scenes that selectors mean. Patterns match only scenes that are present and have truth.
 
-    A pattern with a size takes the scenes that are present in it, one with ``predict`` also those
-    without truth.
+    With an option ``size``, a pattern takes the scenes that are present in that size. With ``predict``
+    it also takes scenes without truth.
 
     Parameters
     ----------
     needs_truth
-        Are they to be scored? To be looked at, scenes need no truth.
+        Are the scenes to be scored? Scenes that are only looked at need no truth.
 
     Raises
     ------
@@ -158,7 +166,7 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None, needs
 
 
 def _unfit(listing: Listing, options: Mapping[str, str], needs_truth: bool) -> str:
-    """Why a scene cannot be had with those options; empty if it can."""
+    """Why a scene cannot be used with those options; empty if it can."""
     size = options.get("size")
     if needs_truth and not listing.truth and "predict" not in options:
         return _NO_TRUTH
@@ -170,7 +178,7 @@ def _unfit(listing: Listing, options: Mapping[str, str], needs_truth: bool) -> s
 
 
 def _no_match(spec: Spec, hits: Sequence[str], unfit: Mapping[str, str]) -> UserError:
-    """The error for a pattern that means no scene that can be compared; `unfit` says why of those present."""
+    """The error for a pattern without usable scenes. `unfit` gives the reason for each scene that is present."""
     if not hits:
         return UserError(f"no scene {spec.name!r} exists: see 'matbench list'")
     which = f"{len(hits)} scenes that {spec.name!r} matches"
@@ -195,11 +203,12 @@ def load_scene(
     Parameters
     ----------
     name
-        ``dataset/scene`` or the path of a folder, options in brackets; one value for each. Besides its
-        dataset's own, every scene has ``predict=left`` and ``predict=right``: that end view is held out.
-        Where methods run, another process loads it, and what comes has no truth (`matbench.scenes.views_only`).
+        ``dataset/scene`` or the path of a folder, with options in brackets, one value for each. Besides the
+        options of its dataset, every scene has ``predict=left`` and ``predict=right``: that end view is held out.
+        In a process in which methods run, another process loads the scene, and it comes without truth
+        (`matbench.scenes.views_only`).
     data
-        The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
+        The folder of real scenes; by default the one that MATBENCH_DATA names, else the user's data folder.
     plugin
         Python files that hold further datasets.
 
@@ -228,7 +237,7 @@ def load_scene(
 
 
 def _load(name: str, options: Mapping[str, str], data: str | Path | None) -> Scene:
-    """From the dataset that the name without its options says."""
+    """Load a scene from the dataset that its name, given without options, begins with."""
     if (folder := own_folder(name)) is not None:
         return _dataset(OWN).load(folder, options, None)
     prefix, slash, rest = name.partition("/")
@@ -248,7 +257,7 @@ def _load(name: str, options: Mapping[str, str], data: str | Path | None) -> Sce
 
 
 def default_scenes(data: str | Path | None = None) -> tuple[list[str], list[str]]:
-    """Three synthetic scenes and the paper's three: those that are present, and those missing."""
+    """The default scenes, three synthetic ones and the paper's three: those present, and those missing."""
     known = listings(data)
     present = {name for name, listing in known.items() if isinstance(listing, Listing) and listing.present}
     synthetic = [name for name in SYNTHETIC_SCENES if name in present]
