@@ -1,12 +1,15 @@
-"""One digest of code: of all that a method really imports, by what that does.
+"""One digest of code, over all that a method imports; a changed comment does not change it.
 
-Nothing is executed. Sources are read, and their import statements followed: those in functions too, relative ones,
-and `importlib.import_module` with a literal text. Files of the harness, of the method's own project and of whatever
-is not installed by its version (an editable package, a file beside a plug-in) count by their content; other people's
-packages by name and version; the standard library not at all.
+Nothing is executed. Sources are read and their imports followed: import statements, also relative ones and those in
+functions, and `importlib.import_module` with a literal text. How a module counts depends on where it comes from:
 
-Content is the syntax tree without docstrings: comments and formatting change nothing. It is written down field by
-field, empty fields left out, so that a digest does not change with Python as long as the grammar of the file does not.
+- by its content: the harness, the method's own project, and all that is not installed with a version (an editable
+  package, a file beside a plug-in);
+- by name and version: other installed packages;
+- not at all: the standard library.
+
+Content is the syntax tree without docstrings, so comments and formatting do not count. The tree is written field by
+field, without empty fields: so other versions of Python give the same digest, as long as their grammar is the same.
 """
 
 import importlib.util
@@ -29,21 +32,21 @@ HARNESS = "matbench"
 NOT_THERE = "none"
 _SUFFIXES = (*EXTENSION_SUFFIXES, *SOURCE_SUFFIXES)
 _INSTALLED = ("site-packages", "dist-packages")
-# `Scene.scored_regions` follows from ground truth, which no method is given
+# (importer, module) not followed: `Scene.scored_regions` needs ground truth, which no method is given
 _ASIDE = {("matbench.scene", "matbench.regions")}
 
 
 @frozen
 class Code:
-    """What some code consists of.
+    """The modules and packages that some code consists of.
 
     Parameters
     ----------
     parts
-        Module -> digest of its content, or distribution -> its version, ``none`` if it is not there. A module beside
-        a plug-in has a name that begins with a dot.
+        Module -> digest of its content, or distribution -> its version; ``none`` if it is not installed. The name
+        of a module beside a plug-in begins with a dot.
     files
-        Module -> its file, for all that is followed.
+        Module -> its file, for all modules that count by their content.
     """
 
     parts: Mapping[str, str]
@@ -61,7 +64,7 @@ class Code:
 
 
 def of_module(name: str, attribute: str = "") -> Code:
-    """The code behind a module, or behind what it calls `attribute`; empty parts if there is no such module."""
+    """The code behind a module, or behind its name `attribute`; without parts if there is no such module."""
     top = name.partition(".")[0]
     reader = _Reader(None, frozenset(_owners(top)))
     reader.follow("", Import(0, name, attribute))
@@ -69,7 +72,7 @@ def of_module(name: str, attribute: str = "") -> Code:
 
 
 def of_file(path: Path, alone: bool = False) -> Code:
-    """The code behind a Python file, and that beside it which it imports; `alone` takes the file and nothing else.
+    """The code behind a Python file and all that it imports; with `alone`, the file and nothing else.
 
     Raises
     ------
@@ -101,10 +104,10 @@ def of_content(path: Path) -> str:
 
 
 def lies_beside(folder: Path, top: str) -> bool:
-    """Does ``import top`` mean what lies in the folder of the file that says so?
+    """Does ``import top``, in a file of that folder, mean something that lies in the folder?
 
-    As for a script: files there come before what is installed, a folder that is no regular package after it. The
-    harness is always the one that runs.
+    The rules are those for a script: files there come before installed packages; a folder without ``__init__.py``
+    comes after them. ``import matbench`` always means the harness that runs.
     """
     if top == HARNESS or top in sys.builtin_module_names:
         return False
@@ -114,7 +117,7 @@ def lies_beside(folder: Path, top: str) -> bool:
 
 @frozen
 class _Found:
-    """A module: its file (none for a namespace package), and where submodules lie if it is a package."""
+    """A module: its file (None for a namespace package), and the folders of its submodules (None if it has none)."""
 
     name: str
     file: str | None
@@ -128,9 +131,9 @@ class _Reader:
     Parameters
     ----------
     folder
-        That of a plug-in; its modules are named as in a package without a name, ``.mine`` and ``.helper``.
+        The folder of a plug-in. Its modules are named as if their package had an empty name: ``.mine``, ``.helper``.
     own
-        The distributions that the method itself comes from: their files are followed, too.
+        The distributions that the method itself comes from. Their files are followed, too.
     """
 
     folder: Path | None
@@ -142,7 +145,7 @@ class _Reader:
     _seen: set[tuple[str, str]] = field(factory=set)
 
     def read(self) -> Code:
-        """Follow whatever is left to follow."""
+        """Follow the imports of all modules counted so far, and of those found on the way."""
         while self._todo:
             module, found = self._todo.popleft()
             for one in found.imports:
@@ -156,7 +159,7 @@ class _Reader:
         path = Path(module.file)
         try:
             content = path.read_bytes()
-        except OSError:  # whoever imports it is told so
+        except OSError:  # who imports it gets the error
             self.parts[module.name] = "unreadable"
             return
         self.files[module.name] = path
@@ -190,16 +193,16 @@ class _Reader:
             self.parts.setdefault(name, NOT_THERE)
 
     def _enter(self, name: str) -> None:
-        """Count a package that something else is imported from: its own code runs as well.
+        """Count a package from which a module is imported: the package's own code runs as well.
 
-        Those of the harness are known to do nothing but give names, each of which is followed alone.
+        Packages of the harness are left out. They do nothing but import names, and each name is followed alone.
         """
         found = self._find(name)
         if found is not None and not _is_harness(found):
             self.count(found)
 
     def _take(self, module: _Found, what: Import) -> None:
-        """Count what is taken from a module that was found, or all of it."""
+        """Count what is imported from a module; all of the module if no name is given."""
         if module.inside is None or not _is_harness(module):
             self.count(module)
         if module.inside is None or not what.name:
@@ -212,21 +215,21 @@ class _Reader:
             self.follow(module.name, _absolute(names[what.name], module))
         elif (sub := self._find(f"{module.name}.{what.name}")) is not None:
             self._take(sub, Import(0, sub.name))
-        elif not what.is_attribute:  # it is written there
+        elif not what.is_attribute:  # the name is defined in the package's own file
             self.count(module)
 
     def _names(self, package: _Found) -> Mapping[str, Import]:
-        """The names that a package takes from elsewhere, and where from."""
+        """Name -> import, for the names that a package itself imports."""
         if package.file is not None and package.file.endswith(tuple(SOURCE_SUFFIXES)):
             with suppress(OSError):
                 return facts(Path(package.file).read_bytes(), is_package=True).names
         return {}
 
     def _meant(self, importer: str, name: str) -> str:
-        """The name under which an absolute import is found: beside the plug-in, if it is said there."""
+        """The full name of an absolute import. It begins with a dot if it means a file beside the plug-in."""
         top = name.partition(".")[0]
         if self.folder is None or not top or not importer.startswith(".") or importer == f".{top}":
-            return name  # a file that imports its own name means another
+            return name  # a file that imports its own name means an installed module
         return f".{name}" if lies_beside(self.folder, top) else name
 
     def _find(self, name: str) -> _Found | None:
@@ -271,7 +274,7 @@ def _absolute(what: Import, where: _Found) -> Import:
 
 
 def _in_folders(last: str, folders: Sequence[str]) -> _Found | None:
-    """A module of that name in one of several folders, as Python looks for it; named by its last part."""
+    """Look for a module in several folders, as Python does. `last` is the last part of its name."""
     portions = []
     for folder in folders:
         base = os.path.join(folder, last)  # noqa: PTH118 (asked a hundred times a start)
@@ -286,14 +289,14 @@ def _in_folders(last: str, folders: Sequence[str]) -> _Found | None:
 
 
 def _installed(top: str) -> _Found | None:
-    """What ``import top`` finds for everyone."""
+    """The module that ``import top`` finds in any file, without a look beside plug-ins."""
     with suppress(ImportError, ValueError, AttributeError):  # whatever odd modules and finders raise
         return _of_spec(top, importlib.util.find_spec(top))
     return None
 
 
 def _by_finders(name: str, inside: Sequence[str]) -> _Found | None:
-    """A module that only a finder of its own knows, as those of editable installations do."""
+    """Look for a module that only a special finder knows, such as that of an editable installation."""
     for finder in sys.meta_path:
         if finder is not PathFinder:
             with suppress(Exception):
@@ -311,7 +314,7 @@ def _of_spec(name: str, spec: ModuleSpec | None) -> _Found | None:
 
 @cache
 def _owners(top: str) -> tuple[tuple[str, str], ...]:
-    """The distributions, name and version, that have installed a module where it lies; none if it is followed."""
+    """Name and version of the distributions that have installed a module; none if its content counts instead."""
     if top == HARNESS or top in sys.stdlib_module_names:
         return ()
     found = _installed(top)
@@ -321,9 +324,9 @@ def _owners(top: str) -> tuple[tuple[str, str], ...]:
 
 
 def _holding(top: str, root: str) -> list[Path]:
-    """The metadata, in a folder that packages are installed in, of those that hold a module.
+    """The metadata of those distributions in a folder that hold a module.
 
-    They are looked through rather than `importlib.metadata` asked, which reads all files of all of them.
+    `importlib.metadata` is not used here: it would read all files of all distributions, which takes much longer.
     """
     every = [info for info in _metadata(root) if not _is_editable(info)]
     named = [info for info in every if _name_and_version(info)[0] == top.lower().replace("_", "-")]
@@ -350,7 +353,7 @@ def _metadata(root: str) -> tuple[Path, ...]:
 
 
 def _name_and_version(info: Path) -> tuple[str, str]:
-    """As they stand in the name of a distribution's metadata: ``opencv_python-4.10.dist-info``."""
+    """Name and version, from the name of the metadata's folder: ``opencv_python-4.10.dist-info``."""
     name, _, version = info.stem.partition("-")
     return name.lower().replace("_", "-"), version.partition("-")[0]
 

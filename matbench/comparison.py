@@ -1,4 +1,4 @@
-"""A whole comparison: choose methods and scenes, run, score, report. Where the parts are put together."""
+"""A whole comparison: choose methods and scenes, run, score, report. This module puts the parts together."""
 
 import shlex
 import sys
@@ -47,14 +47,14 @@ class Comparison:
     Parameters
     ----------
     scenes
-        Name -> scene, whole, for every scene of the plan.
+        Name -> scene with its truth, for every scene of the plan.
     command
-        The line that asked for it, for the report.
+        The command line that asked for the comparison, for the report.
     left_out
-        Why -> scenes that a pattern means but that cannot be compared.
+        Reason -> scenes that a pattern matches but that cannot be compared.
     files
-        Users' own files that may be read: scenes and metrics in them are known. Those that a plan names are read
-        only if they are here, too: a run folder may come from anywhere.
+        Users' own files that may be read, for their scenes and metrics. A file that the plan names is read only if
+        it is also here: a run folder may come from anywhere, and could name any file.
     """
 
     plan: Plan
@@ -71,11 +71,11 @@ class Comparison:
 
     @property
     def remarks(self) -> list[str]:
-        """What readers of the scores should know of the scenes, a line each."""
+        """Remarks on the scenes for readers of the scores, one line each."""
         return [f"{name}: {said}" for name, scene in self.scenes.items() if (said := beyond_range(scene))]
 
     def pending(self) -> Todo:
-        """What is not done yet, from one look at every stored cell; no other may work on the run meanwhile."""
+        """The cells to compute, found by reading every stored cell. Hold the run's lock until they are used."""
         return pending(self.plan, self.store, self.settings)
 
     def run(self, listen: run.Listener | None = None, todo: Todo | None = None) -> None:
@@ -84,7 +84,7 @@ class Comparison:
         Parameters
         ----------
         todo
-            What `pending` said, by whoever has held the run since; it is looked up if not given.
+            The result of `pending`, if the caller has held the run's lock since. By default it is found here.
 
         Raises
         ------
@@ -134,12 +134,14 @@ class Comparison:
         return found
 
     def kept(self, todo: Todo, is_ablation: bool = False) -> Tables | None:
-        """The tables as they lie in the folder, if they and the page are what would be made now; else None.
+        """The tables in the run folder, if they and the report are what would be made now; else None.
 
         Parameters
         ----------
         todo
-            What `pending` has just said.
+            The result of `pending`, from just now.
+        is_ablation
+            Does the report show an ablation?
         """
         if todo.cells or len(todo.outcomes) < len(self.plan.cells):
             return None
@@ -155,7 +157,7 @@ class Comparison:
         return scores.read(self.folder, found.unsteady, todo.outcomes)
 
     def sweeps(self, results: "pd.DataFrame") -> "list[Sweep]":
-        """The curves of whatever takes several numbers; written as ``sweeps.csv`` if there are any."""
+        """The curves over all options and parameters that take several numbers; written to ``sweeps.csv`` if any."""
         from matbench.results.sweeps import sweeps, table
 
         found = sweeps(self.plan, results)
@@ -164,7 +166,7 @@ class Comparison:
         return found
 
     def ablation(self, results: "pd.DataFrame") -> "pd.DataFrame":
-        """What each factor does; written as ``ablation.csv`` and ``ablation.tex``, too."""
+        """The effect of each factor; also written to ``ablation.csv`` and ``ablation.tex``."""
         from matbench.reports import switches
         from matbench.results.ablation import ablation
 
@@ -174,7 +176,7 @@ class Comparison:
         return table
 
     def report(self, tables: Tables, ablation: "pd.DataFrame | None" = None, sweeps: "Sequence[Sweep]" = ()) -> Path:
-        """Write ``report.html``: every map that it shows is read once more."""
+        """Write ``report.html``. Every map that it shows is read once more, because tables keep no maps."""
         from matbench.reports import page
 
         stored = {(c.method.algorithm, c.method.changed, c.scene, c.seed): c for c in self.plan.scored}
@@ -186,7 +188,7 @@ class Comparison:
         def disparity(algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
             names = algorithm, params, scene, seed
             solved = self.store.read(stored[names])
-            # one that has changed since it was scored has no picture
+            # a picture of other maps than those that were scored would mislead
             return solved.maps.get(self.scenes[scene].ref) if solved.outcome == outcomes[names] else None
 
         def volume(algorithm: str, params: str, scene: str, seed: int) -> StoredVolume | None:
@@ -221,18 +223,18 @@ class Comparison:
         return path
 
     def _rows(self, outcomes: Iterable[Outcome]) -> tuple[int, ...]:
-        """The image rows whose slices the page shows: those asked for now, and those that recordings show."""
+        """The image rows whose epipolar slices the page shows: those asked for now, and those in the recordings."""
         options = [self.settings.record, *(outcome.recorded for outcome in outcomes)]
         return tuple(sorted({row for option in options if option is not None for row in option.rows})[:MOST_ROWS])
 
     def _asked(self, is_ablation: bool) -> list[object]:
-        """What decides the page besides the tables and what they are made from."""
+        """All that changes the page, besides the tables and what they are made from."""
         rows = self.settings.record.rows if self.settings.record is not None else ()
         name, spellings = self.folder.resolve().name, dict(self.plan.spellings)
         return [self.command, name, list(rows), is_ablation, spellings, list(self.remarks)]
 
     def _facts(self, found: Tables) -> dict[str, str]:
-        """What the cells ran on, each on its own: a run may go on elsewhere."""
+        """What the cells ran on. Each cell has facts of its own: a run may be continued on another machine."""
         from matbench.reports import costs
 
         outcomes = [found.outcomes[cell.key] for cell in self.plan.cells if cell.key in found.outcomes]
@@ -280,7 +282,7 @@ def _prepare(
     repeats: int,
     write: bool,
 ) -> Comparison:
-    """What `prepare` says, where scenes of one's own are known."""
+    """`prepare`, within the block in which users' own scenes are found."""
     if not 1 <= repeats <= 100:
         raise UserError(f"repeats {repeats} is not a whole number from 1 to 100")
     rows = settings.record.rows if settings.record is not None else ()
@@ -356,12 +358,13 @@ def compare(
         Selectors such as ``"synthetic/*"`` or ``"middlebury2003/teddy[views=0:9:2]"``; the
         default synthetic scenes (box, curved, weak) and the paper's three where they are present, if not given.
     data
-        The folder of real scenes; without it the one that MATBENCH_DATA names, else the person's own.
+        The folder of real scenes; by default the one that MATBENCH_DATA names, else the user's data folder.
     out
         The run folder; ``runs/<digest of the request>`` if not given. A folder that holds the
         same request is resumed.
     record
-        Also write a rerun recording of every cell, from a second, untimed solve: of all, or of what is chosen.
+        Also write a rerun recording of every cell, from a second, untimed solve. True records everything; a
+        `RecordOption` chooses.
     volumes
         Also keep the volume of every cell whose method has one, and score it.
     seed
@@ -373,7 +376,7 @@ def compare(
     repeats
         How often every cell is solved; more than once shows whether a method repeats itself.
     settings
-        Limits, cells at once, a cluster, which cells. What is given by a parameter of its own goes before it.
+        Limits, how many cells run at once, a cluster, which cells to run. Parameters of this function override it.
 
     Returns
     -------
@@ -383,7 +386,7 @@ def compare(
     Raises
     ------
     UserError
-        For anything asked for that cannot be; nothing is written then.
+        If anything that was asked for is impossible. Nothing is written then.
     """
     wanted = record if isinstance(record, RecordOption) else RecordOption() if record else settings.record
     if wanted is not None and row is not None:

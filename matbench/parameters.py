@@ -1,4 +1,4 @@
-"""A method's parameters: their types and groups, reading their values, and which of them say nothing.
+"""A method's parameters: their types and groups, how their values are read, and which of them have no effect.
 
 A constructor's arguments are the parameters. An argument whose type is an attrs class is a group of them.
 """
@@ -72,7 +72,7 @@ def describe(kind: Any) -> str:
 
 @frozen
 class Parameter:
-    """One parameter of a method, as it is typed.
+    """One parameter of a method.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Parameter:
     default
         `inspect.Parameter.empty` if it must be given.
     group
-        The argument of the constructor that holds it; empty if it is one itself.
+        The argument of the constructor whose class holds it; empty if the parameter is an argument itself.
     """
 
     kind: Any
@@ -92,13 +92,13 @@ class Parameter:
 def parameters(cls: type) -> dict[str, Parameter]:
     """Every parameter of a method by its name.
 
-    An argument of the constructor whose type is an attrs class is a group: its fields are parameters under their own
-    names, and no two may share one. The group's default may set other defaults than its fields have.
+    An argument of the constructor whose type is an attrs class is a group. Its fields are parameters under their own
+    names, and all names must differ. If the argument has a default, its values are the defaults of the fields.
 
     Raises
     ------
     UserError
-        If they cannot be read, as with an annotation that names nothing, or a name stands twice.
+        If they cannot be read, as with an annotation of an unknown name, or if two have the same name.
     """
     found: dict[str, Parameter] = {}
     arguments = _arguments(cls)
@@ -125,7 +125,7 @@ def is_group(kind: Any) -> bool:
 
 
 def _arguments(cls: type) -> dict[str, tuple[Any, Any]]:
-    """Name -> (type, default) of every argument of a constructor, groups as they are."""
+    """Name -> (type, default) of every argument of a constructor; a group is one argument."""
     try:
         hints = get_type_hints(vars(cls)["__init__"]) if "__init__" in vars(cls) else {}
         signature = inspect.signature(cls)
@@ -137,14 +137,14 @@ def _arguments(cls: type) -> dict[str, tuple[Any, Any]]:
 
 
 def _default(cls: type, argument: inspect.Parameter) -> Any:
-    """What an argument is if it is not given, also where an attrs class has a factory for it."""
+    """The default of an argument, also if an attrs class makes it by a factory."""
     field_ = fields_dict(cls).get(argument.name) if has(cls) else None
     made: Any = None if field_ is None else field_.default
     return made.factory() if isinstance(made, Factory) and not made.takes_self else argument.default  # type: ignore[arg-type]
 
 
 def _grouped(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments that say the same with groups; of a group given whole, the others' values stay."""
+    """The arguments of the constructor, from parameters by name. A group that is given whole keeps its other values."""
     taken = dict(given)
     for name, (kind, default) in _arguments(cls).items():
         if is_group(kind):
@@ -157,11 +157,11 @@ def _grouped(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def flat(cls: type[T]) -> type[T]:
-    """Let the constructor of a class take parameters of its groups by their own names, too.
+    """Class decorator: the constructor takes the parameters of its groups by their own names, too.
 
-    ``Materiality(pairs="all")`` is then ``Materiality(matching=Matching(pairs="all"))``, and `attrs.evolve`
-    takes ``pairs="all"`` as well. One that changes nothing (`silent_in`) is refused by a ValueError, unless
-    it has its default.
+    ``Materiality(pairs="all")`` then means ``Materiality(matching=Matching(pairs="all"))``, and `attrs.evolve`
+    takes ``pairs="all"`` as well. A parameter without effect (`silent_in`) raises ValueError, unless its value
+    is its default.
     """
     made = cls.__init__
 
@@ -178,22 +178,21 @@ def flat(cls: type[T]) -> type[T]:
 
 
 def silent_in(instance: object) -> Mapping[str, str]:
-    """The parameters that nothing reads beside the values of the others -> what they take to be read.
+    """Parameter -> what it needs to have an effect, for those without effect beside the values of the others.
 
-    None where a method's `silent` is something else.
+    Empty if the method's `silent` is no mapping.
     """
     silent = getattr(instance, "silent", {})
     return silent if isinstance(silent, Mapping) else {}
 
 
 def refuse_silent(name: str, instance: object, options: Mapping[str, Any]) -> None:
-    """Refuse options of which nothing would come.
+    """Refuse options without effect: whoever gives one expects it to change something.
 
     Raises
     ------
     UserError
-        If one of them is a parameter that changes nothing beside the values of the others, or the method's
-        `silent` fails.
+        If an option changes nothing beside the values of the others, or the method's `silent` fails.
     """
     try:
         silent = silent_in(instance)
@@ -214,22 +213,22 @@ def required(cls: type) -> list[str]:
 
 
 def _kind_of(default: object) -> Any:
-    """The type of a parameter that has no annotation: that of its default, if it is a simple one."""
+    """The type of a parameter without annotation: the type of its default if that is a simple one, else any."""
     if isinstance(default, Path):
         return Path
     return type(default) if type(default) in (bool, int, float, str) else Any
 
 
 def presets_of(cls: type) -> Mapping[str, Mapping[str, Any]]:
-    """A method's named sets of parameters; none where its `presets` are something else."""
+    """Name -> parameters: the presets of a method; none if its `presets` are no mapping."""
     presets = getattr(cls, "presets", {})
     return presets if isinstance(presets, Mapping) else {}
 
 
 def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
-    """Make an instance of a method from typed or written options.
+    """Make an instance of a method from options, given as typed texts or as values.
 
-    ``preset=NAME`` starts from one of the method's named sets; other options then override it.
+    ``preset=NAME`` starts from one of the method's presets; other options override its values.
 
     Raises
     ------
@@ -268,8 +267,8 @@ def values_of(instance: object) -> dict[str, Value]:
     Raises
     ------
     UserError
-        If an instance does not keep a parameter under its name, or its value is no simple one:
-        it could be neither stored nor told from others.
+        If the instance has no attribute of a parameter's name, or the value is no simple one: it could not
+        be stored, nor told from other values.
     """
     values: dict[str, Value] = {}
     for key, (kind, _) in _arguments(type(instance)).items():
@@ -296,7 +295,7 @@ def plain(value: Any) -> Any:
 
 
 def paths_of(instance: object) -> dict[str, Path]:
-    """Those parameters of a method's instance that are paths, if they are given."""
+    """Parameter -> path, for those parameters of a method's instance that are paths and have a value."""
     found, values = {}, values_of(instance)
     for key, one in parameters(type(instance)).items():
         value = values.get(key)
@@ -306,7 +305,7 @@ def paths_of(instance: object) -> dict[str, Path]:
 
 
 def changed(instance: object, preset: str | None = None) -> dict[str, Value]:
-    """Only those parameters that differ from their defaults, or the preset's name and what differs from it."""
+    """The parameters that differ from their defaults; with a preset, its name and those that differ from it."""
     cls = type(instance)
     base = {key: one.default for key, one in parameters(cls).items()}
     named: dict[str, Value] = {} if preset is None else {"preset": preset}

@@ -1,4 +1,4 @@
-"""Scoring runs on disk again, and joining runs. No method runs, and no plug-in file is read but those given."""
+"""Scoring runs on disk again, and joining runs. No method runs, and only plug-in files that are given are read."""
 
 import shlex
 import shutil
@@ -22,7 +22,7 @@ from matbench.scenes.catalogue import data_root, load_scene
 
 @frozen(eq=False)
 class Scenes:
-    """The scenes of a plan that are on this machine and unchanged, and why others are not.
+    """The scenes of a plan: those that are on this machine and unchanged, and those that are not.
 
     Parameters
     ----------
@@ -54,14 +54,18 @@ class Scenes:
 def open_run(
     folder: Path, data: str | Path | None = None, partial: bool = False, plugin: Sequence[Path] = ()
 ) -> tuple[Comparison, Mapping[str, str]]:
-    """A run on disk as a comparison, as `matbench.comparison.prepare` made it; and left-out scenes -> why.
+    """Open a run on disk as the comparison that `matbench.comparison.prepare` made.
 
     Parameters
     ----------
     partial
-        Leave out the scenes that are missing or have changed, and the metrics that nothing offers.
+        Leave out the scenes that are missing or have changed, and metrics that are not installed.
     plugin
-        The users' own files that are read. Those that the run names are not: it may come from anywhere.
+        The users' own files that are read. Files that only the run names are not: it may come from anywhere.
+
+    Returns
+    -------
+    The comparison, and left-out scene -> reason.
 
     Raises
     ------
@@ -103,7 +107,7 @@ def _open_run(folder: Path, data: str | Path | None, partial: bool) -> tuple[Com
 
 
 def lost_metrics(table: Path) -> list[str]:
-    """The metrics of a run's table that neither installed plug-ins nor the files in use offer."""
+    """The metrics in a run's table that are found neither in installed plug-ins nor in the files in use."""
     try:
         named = pd.read_csv(table, usecols=["metric"], dtype=str)["metric"].dropna().unique()
     except (OSError, ValueError):  # there is none, or a damaged one, which is made anew
@@ -113,7 +117,7 @@ def lost_metrics(table: Path) -> list[str]:
 
 
 def join(folders: Sequence[Path], out: Path) -> Store:
-    """Make one run of several: every cell once, plan and cells in a new folder.
+    """Join several runs into one, in a new folder. Cells that are in several runs are taken once.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Selectors such as ``materiality[pairs=all,consecutive passes=20]``: a name and options in brackets.
 
-Options are separated by blanks; commas inside a value mean "each of these in turn"; quotes hold
-together a value that has blanks or commas in it. Brackets are read before anything else, so what
-stands before them may be a glob pattern.
+Options are separated by blanks. Several values of an option are separated by commas, and each is taken
+in turn. A value with blanks or commas in it stands in quotes. The name before the brackets may be a
+glob pattern.
 """
 
 import re
@@ -44,6 +44,7 @@ def text(options: Mapping[str, Value]) -> str:
 
 
 def typed(value: Value) -> str:
+    """A value as it is typed: ``true`` and ``none`` in small letters, and in quotes if it needs them."""
     said = str(value).lower() if value is None or isinstance(value, bool) else str(value)
     if isinstance(value, str) and re.search(r"[\s,'\"]", said):
         quote = '"' if "'" in said else "'"
@@ -55,7 +56,7 @@ _VALUES = r"""(?:'[^']*'|"[^"]*"|[^\s,])"""
 
 
 def _values(text: str) -> list[str]:
-    """What stands between commas, without quotes around it."""
+    """The values in a text, separated by commas, without the quotes around them."""
     found = re.findall(rf"(?:^|,)({_VALUES}*)", text)
     return [one[1:-1] if re.fullmatch(r"""'[^']*'|"[^"]*\"""", one) else one for one in found]
 
@@ -92,7 +93,7 @@ def parse(selector: str) -> list[Spec]:
 
 
 def read_scene(name: str) -> Spec:
-    """A scene's name and its options; a dataset may call a scene what is no selector, too.
+    """A scene's name and its options. If the text is no selector, all of it is the name: datasets may name scenes so.
 
     >>> read_scene("synthetic/box[n=3]").options, read_scene("a b[").name
     ({'n': '3'}, 'a b[')

@@ -1,4 +1,4 @@
-"""What a Python source does and imports, read from its syntax tree; nothing is executed."""
+"""Digests and imports of Python sources, read from their syntax trees; nothing is executed."""
 
 import ast
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ class Import:
     name
         What is taken from it, ``*`` for everything; empty for the module itself.
     is_attribute
-        It is not imported but used, as ``module.name``: there may be no such module.
+        The name is not imported but used, as ``module.name``. It need not be a module.
     """
 
     level: int
@@ -36,17 +36,17 @@ class Import:
 
 @frozen
 class Facts:
-    """What a source is, as far as digests go.
+    """What digests of code need to know about a source.
 
     Parameters
     ----------
     digest
-        SHA-256 of what it does.
+        SHA-256 of what the source does: of its syntax tree without docstrings.
     imports
-        All of its imports, but those for type checkers alone.
+        All of its imports, except those for type checkers alone.
     names
-        Name -> what is imported under it at the top level, for type checkers too: so packages that import their
-        names when they are first used say where these are.
+        Name -> what is imported under it at the top level. Imports for type checkers are included: a package that
+        imports its names only when they are first used says in these where the names come from.
     """
 
     digest: str
@@ -56,12 +56,12 @@ class Facts:
 
 @lru_cache(maxsize=4096)
 def facts(source: bytes, is_package: bool) -> Facts:
-    """Read a source; one that is no Python is known by its bytes, and imports nothing.
+    """Read a source. If it is not valid Python, its digest is that of its bytes, and it imports nothing.
 
     Parameters
     ----------
     is_package
-        Only of packages are `names` of use.
+        `names` are found only for packages.
     """
     try:
         tree = ast.parse(source)
@@ -72,14 +72,14 @@ def facts(source: bytes, is_package: bool) -> Facts:
         _write(tree, words, telling)
         whole = sha256("\0".join(words).encode("utf-8", "surrogatepass")).hexdigest()
         return Facts(whole, tuple(dict.fromkeys(_imports(telling))), names)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):  # whoever imports it is told so
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # who imports it gets the error
         return Facts(sha256(source).hexdigest())
 
 
 def _write(node: Any, words: list[str], telling: list[ast.AST]) -> None:
-    """The words of a tree, and its nodes that may tell of imports.
+    """Append the words of a tree to `words`, and its nodes that may tell of imports to `telling`.
 
-    Where things stand is left out, and so are empty fields: later versions of Python have more of them.
+    Line numbers are left out, and so are empty fields: later versions of Python have more of them.
     """
     if isinstance(node, ast.AST):
         kind, values = type(node), node.__dict__
@@ -102,7 +102,7 @@ def _write(node: Any, words: list[str], telling: list[ast.AST]) -> None:
 
 
 def drop_words(tree: ast.AST) -> None:
-    """Take out, in place, what does nothing: docstrings, lone texts, `pass`, and what only type checkers read."""
+    """Remove from a tree, in place, all that does nothing: docstrings, other lone texts, `pass`, `TYPE_CHECKING`."""
     for name in ("body", "orelse", "finalbody", "handlers", "cases"):
         block = getattr(tree, name, None)
         if isinstance(block, list):
@@ -136,7 +136,7 @@ def _names(body: Sequence[ast.stmt]) -> Iterator[tuple[str, Import]]:
 
 
 def _imports(telling: Sequence[ast.AST]) -> Iterator[Import]:
-    """All imports of a source, wherever they stand, and the attributes used of what is imported."""
+    """All imports of a source, wherever they stand, and the attributes of imported names that it uses."""
     bound: dict[str, tuple[int, str]] = {}
     used: list[list[str]] = []
     for node in telling:
@@ -163,7 +163,7 @@ def _imports(telling: Sequence[ast.AST]) -> Iterator[Import]:
 
 
 def _called(node: ast.Call) -> Iterator[Import]:
-    """``import_module("literal")``, and so with dots before the name."""
+    """The import in ``import_module("literal")``; the name may begin with dots."""
     called = getattr(node.func, "id", getattr(node.func, "attr", None))
     if called in ("import_module", "__import__") and node.args and isinstance(node.args[0], ast.Constant):
         name = node.args[0].value
@@ -172,7 +172,7 @@ def _called(node: ast.Call) -> Iterator[Import]:
 
 
 def _chain(node: ast.expr) -> list[str]:
-    """``a.b.c`` as its names; empty for an attribute of anything else."""
+    """The names in ``a.b.c``; empty if the expression does not begin with a name."""
     names: list[str] = []
     while isinstance(node, ast.Attribute):
         names.append(node.attr)
