@@ -1,9 +1,9 @@
-"""One's own scenes: a folder of images with a ``scene.toml``, or a pair as Middlebury lays it out.
+"""Users' own scenes: a folder of images with a ``scene.toml``, or a pair in the folder layout of Middlebury.
 
     views = ["left.png", "middle.png", "right.png"]   # from left to right, evenly spaced
     disparities = [0, 16]                             # least and largest, pixels per view step
     reference = "middle.png"                          # the view that is scored (optional)
-    pair_steps = 1                                    # errors are in px between views so far apart (optional)
+    pair_steps = 1                                    # errors are in px between views this far apart (optional)
 
     [truth."middle.png"]                              # for any views (optional)
     file = "middle_disparity.png"                     # grey PNG or PGM of 8 or 16 bits, or PFM
@@ -43,7 +43,7 @@ class Folder:
     """Scenes named by the path of their folder."""
 
     def listings(self, root: Path | None) -> Sequence[Listing]:  # noqa: ARG002
-        """None: the folders that anyone may name are not known beforehand."""
+        """No scenes: folders are named by their users and not known beforehand."""
         return []
 
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:  # noqa: ARG002
@@ -54,12 +54,12 @@ class Folder:
 
 
 def describe(called: str) -> StoredScene:
-    """What the folder of that path says of its scene; images are not read yet.
+    """Read the description of the scene in a folder. Its images are not read yet.
 
     Raises
     ------
     UserError
-        If the folder holds no scene, or what describes it is malformed.
+        If the folder holds no scene, or its description is malformed.
     """
     folder = Path(called)
     if not folder.is_dir():
@@ -99,7 +99,7 @@ def read(called: str, folder: Path) -> StoredScene:
 
 
 def labels(names: Sequence[str]) -> tuple[str, ...]:
-    """What views are called: by the numbers in their files' names if only these differ and increase, else 0, 1, ...
+    """Labels of views: the numbers in their file names if these increase and nothing else differs, else 0, 1, ...
 
     >>> labels(["im2.png", "im6.png", "im10.png"])
     ('2', '6', '10')
@@ -125,7 +125,7 @@ def _parsed(path: Path) -> dict[str, Any]:
 
 
 def _said(value: object) -> str:
-    """A value as shown in a message."""
+    """A value as messages show it, cut to 60 characters."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -179,7 +179,7 @@ def _number(value: object) -> float | None:
 
 
 def _view(path: Path, names: Sequence[str], given: object, what: str) -> int:
-    """Index of the view of that file name, or of that name without its ending."""
+    """Index of the view with that file name, given with or without its ending."""
     stems = [name.rpartition(".")[0] or name for name in names]
     if isinstance(given, str):
         for known in (list(names), stems):

@@ -1,4 +1,4 @@
-"""Writing a ``scene.toml`` for a folder of images: names sorted, order and range measured where they can be."""
+"""Writing a ``scene.toml`` for a folder of images. The order of the views and the range are measured if possible."""
 
 import json
 import re
@@ -22,16 +22,16 @@ from matbench.scenes import alignment
 _IMAGES = (".png", ".ppm", ".pgm")
 _NOT_READ = (".bmp", ".exr", ".gif", ".jpeg", ".jpg", ".tif", ".tiff", ".webp")
 _NO_VIEW = re.compile(r"disp(?!lay)|depth|truth|mask|n?o?nocc|(^|[^a-z])gt([^a-z]|$)", re.IGNORECASE)
-_MEASURED = 24  # at most so many views are matched; order is told only where that is all of them
-_COLOURS = 8  # a picture that has no more is a mask
+_MEASURED = 24  # at most this many views are matched; their order is measured only if there are no more
+_COLOURS = 8  # an image with no more colours is a mask
 _SURE = 40  # matched features from which a range is guessed
-_MARGIN = 0.5  # of the largest measured disparity: few features lie on what is nearest
+_MARGIN = 0.5  # of the largest measured disparity: there may be few features on the nearest surface
 _OUT_OF_ORDER = 0.3  # of a view step
 
 
 @frozen
 class Draft:
-    """What was written, and what a person should know of it.
+    """The file that was written, and remarks for its user.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def write(folder: Path, disparities: tuple[float, float] | None = None, replace:
     names, remarks = _views(folder)
     images = {name: read_rgb(folder / name) for name in names}
     masks = [name for name, image in images.items() if _is_mask(image)]
-    if len(masks) < len(names):  # where all look so, they are random dots, say
+    if len(masks) < len(names):  # if all have few colours they are views all the same, such as random dots
         names = [name for name in names if name not in masks]
         remarks += [f"left out: {name}, a mask: it has no more than {_COLOURS} colours" for name in masks]
         _check_count(folder, names)
@@ -95,7 +95,7 @@ def natural(name: str) -> list[tuple[int, str]]:
 
 
 def _views(folder: Path) -> tuple[list[str], list[str]]:
-    """Names of the images taken for views, and remarks on those that were not."""
+    """Names of the images that are taken as views, and remarks on those that are not."""
     files = [path for path in folder.iterdir() if path.suffix.lower() in _IMAGES and path.is_file()]
     images = sorted((path.name for path in files if not _NO_VIEW.search(path.stem)), key=natural)
     sizes: dict[str, tuple[int, int]] = {}
@@ -138,7 +138,7 @@ def _is_mask(image: NDArray[np.uint8]) -> bool:
 
 
 def _measure(names: Sequence[str], images: Sequence[NDArray[np.uint8]]) -> tuple[list[int], Range | None, list[str]]:
-    """Indices from left to right, the range of disparities, and what was found."""
+    """Indices of the views from left to right, the range of disparities (None if unknown), and remarks."""
     count, ref = min(len(images), _MEASURED), (min(len(images), _MEASURED) - 1) // 2
     matches = alignment.match(np.stack(images[:count]), ref)
     places = alignment.places(matches, count, ref)
@@ -153,7 +153,8 @@ def _measure(names: Sequence[str], images: Sequence[NDArray[np.uint8]]) -> tuple
         return given, None, [f"the order of the views is that of their names: too few features {match}"]
     found = alignment.disparities(matches, places)
     order, notes = given, []
-    if len(found) and np.median(found) < 0 and np.mean(found < 0) > 0.9:  # nearer is larger, mostly beyond 0
+    # most disparities are positive in a scene: if they come out negative, the names run from right to left
+    if len(found) and np.median(found) < 0 and np.mean(found < 0) > 0.9:
         places, found = -places, -found
     if count == len(images):
         order = [int(index) for index in np.argsort(places, kind="stable")]
@@ -170,7 +171,7 @@ def _measure(names: Sequence[str], images: Sequence[NDArray[np.uint8]]) -> tuple
 
 
 def _truth(folder: Path, names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """View -> truth file that seems to be its own, and how it is stored."""
+    """View -> the truth file that seems to belong to it, and that file's encoding."""
     found: dict[str, tuple[str, str]] = {}
     files = sorted((path.name for path in folder.iterdir() if path.suffix.lower() in (*_IMAGES, ".pfm")), key=natural)
     for file in files:
@@ -186,7 +187,7 @@ def _truth(folder: Path, names: Sequence[str]) -> dict[str, tuple[str, str]]:
 
 
 def _belongs(truth: str, view: str) -> bool:
-    """Has the truth's name the view's number, or the view's whole name in it?"""
+    """Does the truth file's name hold the view's number or, for a view without a number, its whole name?"""
     numbers, wanted = (re.findall(r"[0-9]+", Path(name).stem) for name in (truth, view))
     if wanted:
         return bool(numbers) and int(numbers[-1]) == int(wanted[-1])

@@ -1,7 +1,7 @@
-"""Scenes that are computed: exact truth and visibility in every view, the same on every machine.
+"""Computed scenes, with exact truth and visibility in every view; they are the same on every machine.
 
-Each tests one difficulty; `worlds` says which. What cameras do to a picture (`cameras`) is an
-option of every scene: ``synthetic/fence[n=5 noise=4 gain=0.2 seed=3]``.
+Each scene tests one difficulty (see `worlds`). Every scene has options for the faults of cameras (see
+`cameras`): ``synthetic/fence[n=5 noise=4 gain=0.2 seed=3]``.
 """
 
 from matbench.datasets.synthetic.scenes import OPTIONS, SYNTHETIC, materiality

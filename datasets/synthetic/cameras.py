@@ -1,7 +1,8 @@
-"""What cameras do to a picture: blur, vignetting, gain, bias and noise, and where they put it.
+"""Faults of cameras: blur, vignetting, gain, bias, noise and vertical misalignment.
 
-Gain, bias and height differ from camera to camera: each draws a share from -1 to 1, by the seed,
-and the one that draws most gets the full strength. Vignetting, blur and noise are alike for all.
+Gain, bias and misalignment differ from camera to camera. The seed draws a share from -1 to 1 for each
+camera, scaled so that the largest share has size 1 and that camera gets the full strength. Vignetting,
+blur and noise are equally strong for all cameras.
 """
 
 from collections.abc import Sequence
@@ -13,19 +14,19 @@ from scipy.ndimage import gaussian_filter1d
 
 from matbench.datasets.synthetic.textures import noise, random_bytes
 
-_NOISE, _GAIN, _BIAS, _HEIGHT = 2, 3, 4, 5  # so that each draws numbers of its own
+_NOISE, _GAIN, _BIAS, _HEIGHT = 2, 3, 4, 5  # part of the seed, so that each fault has random numbers of its own
 
 
 @frozen
 class Strengths:
-    """How much of each.
+    """The strength of each fault.
 
     Parameters
     ----------
     gain
         Largest change of a camera's gain: 0.2 multiplies by 0.8 to 1.2.
     bias
-        Largest grey levels that a camera adds or takes.
+        Largest number of grey levels that a camera adds or subtracts.
     vignetting
         Share of the light that is missing in the corners of a picture.
     blur
@@ -35,7 +36,7 @@ class Strengths:
     misaligned
         Largest vertical shift of a camera's picture, px.
     highlight
-        Grey levels that a surface adds where it mirrors the light.
+        Grey levels that a surface adds where it reflects the light to the camera.
     """
 
     gain: float = 0.0
@@ -67,21 +68,21 @@ def _pairs(seed: int, kind: int, cameras: int) -> NDArray[np.uint8]:
 
 
 def heights(strengths: Strengths, seed: int, cameras: int) -> Sequence[float]:
-    """Px by which the picture of each camera lies too low."""
+    """How far the picture of each camera lies too low, px; empty if all are aligned."""
     return [strengths.misaligned * share for share in shares(seed, _HEIGHT, cameras)] if strengths.misaligned else ()
 
 
 def exposed(
     picture: NDArray[np.float32], strengths: Strengths, seed: int, view: int, cameras: int
 ) -> NDArray[np.uint8]:
-    """What a camera makes of a picture.
+    """The picture as a camera with these faults records it.
 
     Parameters
     ----------
     picture
         (H, W, 3) RGB grey levels.
     view, cameras
-        Which camera of how many.
+        Index of the camera, and how many cameras there are.
 
     Returns
     -------

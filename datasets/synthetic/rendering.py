@@ -1,7 +1,7 @@
 """Casting rays into a world of simple surfaces, seen by evenly spaced pinhole cameras.
 
-All that is computed is sums, products, quotients and square roots of float64, in a fixed order:
-the pictures are the same on every machine.
+Only sums, products, quotients and square roots of float64 are computed, in a fixed order. Therefore the
+pictures are the same on every machine.
 """
 
 from collections.abc import Sequence
@@ -15,16 +15,16 @@ from matbench.datasets.synthetic.textures import lookup
 
 _BLOCK = 30  # rows rendered at a time: what they need stays in the cache
 _BEHIND = 1e-7  # relative depth by which a point must lie behind another to be hidden by it
-_MARGIN = 1e-6  # slope around a surface's window that is tried, too
-_POLISH = 5  # times that the cosine of a highlight is squared
+_MARGIN = 1e-6  # slope by which a surface's window is widened: rounding must not cut off its edge
+_POLISH = 5  # how often the cosine of a highlight is squared: its power is 2**5
 
 
 @frozen
 class Rig:
-    """Evenly spaced cameras with one world before them, which must fill every picture.
+    """Evenly spaced cameras in front of one world, which must fill every picture.
 
-    A camera is ``baseline`` to the right of its left neighbour, and its sensor is shifted, so that
-    the disparity of a point is exactly ``focal * baseline / Z - offset`` px per view step.
+    Each camera is ``baseline`` to the right of its left neighbour, and its sensor is shifted. The
+    disparity of a point at depth Z is exactly ``focal * baseline / Z - offset`` px per view step.
 
     Parameters
     ----------
@@ -33,18 +33,18 @@ class Rig:
     count
         How many cameras; the middle of the row is at X = 0.
     width, height
-        Of a picture, px.
+        Size of a picture, px.
     focal
         Focal length, px.
     baseline
         World units between neighbours.
     offset
-        Px per view step that sensors are shifted.
+        Shift of the sensors, px per view step.
     lowered
-        Px by which the picture of each camera lies lower than it should; all 0 if empty.
+        How far the picture of each camera lies too low, px; all 0 if empty.
     highlight
-        Grey levels that surfaces add where they mirror the light: the one thing about a surface
-        that changes with the camera.
+        Grey levels that surfaces add where they reflect the light to the camera. Nothing else about a
+        surface changes with the camera.
     """
 
     surfaces: Sequence[Surface] = field()
@@ -64,16 +64,16 @@ class Rig:
         return self.lowered[view] if self.lowered else 0.0
 
     def _rays(self, view: int, columns: Array, rows: Array) -> tuple[float, Array, Array]:
-        """Eye's X, and right and down of the rays through places in a picture, px."""
+        """X of the camera, and the slopes to the right and down of the rays through places in its picture."""
         steps = view - (self.count - 1) / 2
         middle = (self.width - 1) / 2 + steps * self.offset
         top = rows - self._lowered(view)
         return steps * self.baseline, (columns - middle) / self.focal, (top - (self.height - 1) / 2) / self.focal
 
     def cast(self, view: int, columns: Array, rows: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Depth and index of the nearest surface; columns and rows in px, broadcast against each other.
+        """Depth of the nearest surface on each ray, and the index of that surface, both (H, W).
 
-        Rows are (H, 1); columns are (1, W) or (H, W).
+        Rays go through columns and rows of the picture, px. Rows are (H, 1); columns are (1, W) or (H, W).
         """
         eye, right, down = self._rays(view, columns, rows)
         shape = np.broadcast_shapes(right.shape, down.shape)
@@ -96,7 +96,7 @@ class Rig:
         return np.arange(self.width, dtype=float)[None, :], np.arange(self.height, dtype=float)[:, None]
 
     def depth(self, view: int, fineness: int = 1) -> Array:
-        """(H, fineness (W - 1) + 1) depth behind every pixel's centre, and between: 1 / fineness px apart."""
+        """(H, fineness (W - 1) + 1) depth on the rays through samples 1 / fineness px apart, pixel centres included."""
         columns, rows = self._pixels()
         if fineness > 1:
             columns = np.arange(fineness * (self.width - 1) + 1)[None, :] / fineness
@@ -107,14 +107,14 @@ class Rig:
         return self.disparity(self.depth(view))
 
     def visible(self, view: int, depth: Array | None = None) -> NDArray[np.bool_]:
-        """(n, H, W): does view j see the point that `view` sees at the centre of a pixel?
+        """(n, H, W) bool: does view j see the point that `view` sees at the centre of a pixel?
 
-        The point is projected to its exact place in view j, and a ray is cast through that.
+        The point is projected to its exact place in view j, and a ray is cast through that place.
 
         Parameters
         ----------
         depth
-            What `depth` gave for that view, where it is known already.
+            The result of `depth` for `view`, if it is known already.
         """
         columns, rows = self._pixels()
         depth = self.depth(view) if depth is None else depth
@@ -134,7 +134,7 @@ class Rig:
         Parameters
         ----------
         pattern
-            (size, size, 3) float32 around 0, periodic; on every surface in its own place.
+            (size, size, 3) float32 around 0, periodic. Each surface begins at another place of it.
         """
         columns, rows = self._pixels()
         shifts = [(k + 0.5) / samples - 0.5 for k in range(samples)]
@@ -171,23 +171,23 @@ class Rig:
 
 
 def _span(chosen: NDArray[np.bool_]) -> slice:
-    """From the first that is chosen to the last."""
+    """The slice from the first chosen element to the last; empty if there is none."""
     places = np.flatnonzero(chosen)
     return slice(int(places[0]), int(places[-1]) + 1) if places.size else slice(0)
 
 
 def mirrored(normal: tuple[Array | float, Array | float, Array | float], eye: Point) -> Array:
-    """Share of a highlight: a high power of the cosine between the normal and the half vector.
+    """Strength of a highlight, 0 to 1: a high power of the cosine between the normal and the half vector.
 
-    The half vector lies midway between the directions of the light and of the eye (Blinn 1977,
+    The half vector lies midway between the directions to the light and to the camera (Blinn 1977,
     "Models of light reflection for computer synthesized pictures").
 
     Parameters
     ----------
     normal
-        Unit normals.
+        Unit normals of the points.
     eye
-        From the points to the camera.
+        Vectors from the points to the camera, of any length.
     """
     length = np.sqrt(eye[0] * eye[0] + eye[1] * eye[1] + eye[2] * eye[2])
     half: Vector | Point = tuple(a / length + b for a, b in zip(eye, LIGHT, strict=True))  # type: ignore[assignment]

@@ -24,7 +24,7 @@ OPTIONS = tuple(sorted((*NAMES, "baseline", "disparities", "n", "ref", "seed", "
 
 _WIDTH, _HEIGHT, _VIEWS = 240, 180, 5
 _BASELINE = 1 / 40
-"""In units of the world. Disparity is 6 / Z px per step in pictures 240 px wide, whose focal length is their width."""
+"""In units of the world. The focal length is the width of a picture: at 240 px the disparity is 6 / Z px per step."""
 
 
 def _number(called: str, options: Mapping[str, str], key: str, default: int, least: int, largest: int) -> int:
@@ -56,7 +56,7 @@ def _read_strength(called: str, name: str, text: str) -> float:
 
 @frozen
 class _Request:
-    """A synthetic scene that was asked for, checked."""
+    """The name and options of a synthetic scene, checked."""
 
     called: str
     world: World
@@ -85,7 +85,7 @@ class _Request:
         return self.width / _WIDTH
 
     def rig(self, highlight: float | None = None) -> Rig:
-        """The cameras; `highlight` instead of the strength that was asked for."""
+        """The cameras and their world; `highlight` replaces the strength that was asked for."""
         return Rig(
             self.world.build(),
             self.n,
@@ -103,7 +103,7 @@ class _Request:
 
 
 class Synthetic:
-    """The computed scenes."""
+    """The dataset of computed scenes."""
 
     def listings(self, root: Path | None) -> Sequence[Listing]:  # noqa: ARG002
         """All of them; they need no data root."""
@@ -113,10 +113,10 @@ class Synthetic:
     def load(self, name: str, options: Mapping[str, str], root: Path | None) -> Scene:  # noqa: ARG002
         """Compute a scene.
 
-        Options: `n` views, `size` of a picture, `seed` of textures, cameras and noise, `views` and
-        `baseline` to keep, `ref` to score, by number, `disparities` to search; and what the cameras
-        do (`cameras.Strengths`). Regions come from pictures without any of the latter, so that they stay
-        the same whatever is swept; only a misaligned camera's are where its picture is.
+        Options are `n` (number of views), `size` of a picture, `seed` (of textures, cameras and noise),
+        `views` and `baseline` (which views to keep), `ref` (the view to score, by number), `disparities`
+        to search, and the faults of cameras (`cameras.Strengths`). Regions are found in pictures without
+        these faults, so that they stay the same in a sweep. Only misalignment moves them with the picture.
         """
         ask = _Request.read(name, options)
         labels = [str(view) for view in range(ask.n)]
@@ -141,6 +141,7 @@ class Synthetic:
         for view, (picture, _, _) in found.items():
             views[view] = picture
         _, truth, visible = found[ref]
+        # regions come from this picture: the reference view without faults of the camera and without highlights
         dull = ask.rig(highlight=0).picture(ref, marks) if ask.strengths.highlight else reference
         undisturbed = exposed(dull, NOTHING, ask.seed, ref, ask.n)
         full = Scene(
@@ -158,19 +159,19 @@ class Synthetic:
 
 
 def materiality(name: str, options: Mapping[str, str] | None = None, fineness: int = 1) -> Volume:
-    """The exact materialities of a synthetic scene: 1 where a surface is that some view sees, else 0.
+    """The exact materialities of a synthetic scene: 1 on surfaces that at least one view sees, else 0.
 
     Parameters
     ----------
     name, options
-        As for `Synthetic.load`; all n views count, `views` and `ref` change nothing.
+        As for `Synthetic.load`. All n views are used; `views` and `ref` have no effect.
     fineness
         Planes per pixel of view step, samples per pixel.
 
     Returns
     -------
-    Volume over all n views; see `matbench.space.surface`. The truth of every sample is cast through
-    its own place, not interpolated.
+    Volume over all n views; see `matbench.space.surface`. A ray is cast for every sample; nothing is
+    interpolated.
     """
     ask = _Request.read(name, options or {})
     rig = ask.rig()

@@ -1,6 +1,6 @@
-"""What a ray can meet: simple surfaces with their paint.
+"""Simple surfaces that a ray can meet, and their paint.
 
-World axes: X to the right, Y down, Z away from the cameras, which stand at Y = Z = 0 and look
+World axes: X to the right, Y down, Z away from the cameras. The cameras stand at Y = Z = 0 and look
 along Z.
 """
 
@@ -22,7 +22,7 @@ LIGHT: Vector = (-0.48, -0.6, -0.64)
 EVERYWHERE: Window = (-np.inf, np.inf, -np.inf, np.inf)
 
 _AMBIENT = 0.45
-_NEAR = 1e-3  # what comes closer to the cameras' plane may appear anywhere
+_NEAR = 1e-3  # depth; a surface that comes closer to the cameras may appear anywhere in the picture
 
 
 @frozen
@@ -32,13 +32,13 @@ class Paint:
     Parameters
     ----------
     colour
-        RGB grey levels of its middle.
+        Mean colour, RGB grey levels.
     contrast
-        Grey levels of the pattern's standard deviation.
+        Standard deviation of the pattern, grey levels.
     scale
-        World units of the pattern's period.
+        Period of the pattern, world units.
     place
-        Where on the pattern it begins, in periods; by default somewhere else on every surface.
+        Where in the pattern the surface begins, in periods; by default at another place for every surface.
     """
 
     colour: Vector
@@ -48,21 +48,21 @@ class Paint:
 
 
 class Surface(Protocol):
-    """What a ray can meet."""
+    """A surface that a ray can meet."""
 
     @property
     def paint(self) -> Paint: ...
 
     def window(self, eye: float) -> Window:
-        """Slopes of the rays from (eye, 0, 0) that can meet it; others need not be tried."""
+        """Slopes of the rays from (eye, 0, 0) that can meet the surface. Other rays are not tried, to save time."""
         ...
 
     def depth(self, eye: float, right: Array, down: Array) -> Array:
-        """Depth Z at which the rays (eye, 0, 0) + Z (right, down, 1) meet it; infinite if they do not."""
+        """Depth Z at which the rays (eye, 0, 0) + Z (right, down, 1) meet the surface; infinite if they do not."""
         ...
 
     def coordinates(self, point: Point) -> tuple[Array, Array]:
-        """Two coordinates on the surface, world units, and with them the pattern's place."""
+        """Two coordinates on the surface, world units; they place the pattern on it."""
         ...
 
     def normal(self, point: Point) -> tuple[Array | float, Array | float, Array | float]:
@@ -70,7 +70,7 @@ class Surface(Protocol):
         ...
 
     def shade(self, point: Point) -> Array | float:
-        """Share of the light that it returns: Lambert's cosine law, the same for every camera."""
+        """Share of the light that a point returns, by Lambert's cosine law: it is the same for every camera."""
         ...
 
 
@@ -79,7 +79,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 def _window_of_box(eye: float, x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> Window:
-    """Slopes of all that lies in a box of the world."""
+    """Slopes of the rays that meet a box in the world."""
     if z[0] <= _NEAR:
         return EVERYWHERE
     across, down = ([v / depth for v in pair for depth in z] for pair in ((x[0] - eye, x[1] - eye), y))
@@ -195,7 +195,7 @@ class Sphere:
         )
 
     def coordinates(self, point: Point) -> tuple[Array, Array]:
-        # the pattern is carried onto it along Z: even, as seen from the front
+        # the pattern is projected along Z: the cameras see it without distortion
         return point[0] - self.centre[0], point[1] - self.centre[1]
 
     def normal(self, point: Point) -> tuple[Array, Array, Array]:

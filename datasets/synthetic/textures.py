@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 
 def random_bytes(seed: Sequence[int], count: int) -> NDArray[np.uint8]:
-    """Random bytes; raw bits of a generator, as only these are promised to stay the same."""
+    """Random bytes from the raw bits of a generator: NumPy promises only these to stay the same."""
     words = np.random.PCG64(np.random.SeedSequence(list(seed))).random_raw(-(-count // 8))
     return np.asarray(words, "<u8").view(np.uint8)[:count]
 
 
 def noise(seed: Sequence[int], shape: tuple[int, ...], deviation: float) -> NDArray[np.float64]:
-    """Noise of a standard deviation: a sum of four random bytes, near enough a Gauss curve."""
+    """Noise of that standard deviation: sums of four random bytes, which are nearly normally distributed."""
     count = int(np.prod(shape))
     sums = random_bytes(seed, 4 * count).reshape(4, count).sum(axis=0, dtype=np.int64)
     spread = float(np.sqrt(4 * (256**2 - 1) / 12))
@@ -22,9 +22,9 @@ def noise(seed: Sequence[int], shape: tuple[int, ...], deviation: float) -> NDAr
 
 
 def pattern(seed: int, size: int = 256, cells: Sequence[int] = (4, 8, 16, 32, 64)) -> NDArray[np.float32]:
-    """(size, size, 3) float32, mean 0, deviation 1, periodic: random grids, smooth between, summed.
+    """(size, size, 3) float32 periodic pattern, mean 0, deviation 1: a sum of smoothly interpolated random grids.
 
-    The three channels share most of their values, so that colours are muted.
+    The three channels have a large part in common, so that colours are muted.
     """
     total = np.zeros((size, size, 3))
     for octave, count in enumerate(cells):

@@ -1,7 +1,7 @@
 """The worlds before the cameras, each with one difficulty.
 
 ==========  =====================================================================================
-box         a textured box on a floor before a wall: none in particular
+box         a textured box on a floor before a wall: no particular difficulty
 slanted     planes that all lean, about either axis; nothing faces the cameras
 curved      a slanted corner, balls and a column, with disparities of either sign
 spheres     balls before a bulging wall: no plane anywhere
@@ -23,19 +23,19 @@ from matbench.datasets.synthetic.surfaces import Column, Disc, Paint, Rectangle,
 
 @frozen
 class World:
-    """A world before the cameras.
+    """A world in front of the cameras.
 
-    Disparity is 6 / Z - offset, px per step, where pictures are 240 px wide.
+    In pictures 240 px wide, the disparity at depth Z is 6 / Z - offset px per view step.
 
     Parameters
     ----------
     build
-        Gives its surfaces.
+        Function that returns the surfaces.
     largest, offset
-        The range to search is from -offset to largest - offset, px per step where pictures are
-        240 px wide. It is fixed, with a margin around what there is.
+        The search range is from -offset to largest - offset, px per view step in pictures 240 px wide. It
+        is fixed, with a margin around the true disparities.
     strengths
-        What its cameras do unless an option says otherwise.
+        Faults of the cameras, unless an option sets them.
     """
 
     build: Callable[[], Sequence[Surface]]
