@@ -79,11 +79,11 @@ class Command:
     to be searched. The ``time.txt`` that the SDK wants is not read: `seconds` is measured outside and
     includes writing the images and starting the program.
 
-    The two images are those that `sgbm` matches, both mirrored if the other view is to the left. A
-    range that does not begin at 0 is shifted to it: both images are continued at opposite sides by
-    the least disparity, repeating the edge. The program starts in its own folder; the number of
-    threads stands in OMP_NUM_THREADS. Its output goes to the cell's log. It ends with the process that
-    waits for it, however that ends (on Linux).
+    The two images are those that `sgbm` matches, both mirrored if the other view is to the left. If the
+    range does not begin at 0, it is shifted there: the two images are padded on opposite sides by the
+    least disparity, with repeated edge pixels. The program starts in its own folder; the number of
+    threads stands in OMP_NUM_THREADS. Its output goes to the cell's log. On Linux it is ended when the
+    process that waits for it ends, for whatever reason.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is compared besides colour: horizontal gradient and census of the luma (docs/concepts/methods.md)."""
+"""Features that are compared besides colour: horizontal gradient and census of the luma (docs/concepts/methods.md)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ def luma(rows: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def gradient(grey: NDArray[np.float32], fineness: int) -> NDArray[np.float32]:
-    """Half the difference of the samples one pixel to the right and to the left; beyond an edge its last is taken."""
+    """Half the difference of the samples one pixel to the right and to the left; the edge's sample repeats beyond."""
     q = fineness
     wide = np.concatenate([np.repeat(grey[..., :1], q, -1), grey, np.repeat(grey[..., -1:], q, -1)], axis=-1)
     return np.asarray((wide[..., 2 * q :] - wide[..., : -2 * q]) * np.float32(0.5), np.float32)

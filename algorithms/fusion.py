@@ -34,9 +34,10 @@ def _sum_first(part, place, taken, total):  # type: ignore[no-untyped-def]
 
 @kernel
 def better_half(rho, low, high, hidden, cost):  # type: ignore[no-untyped-def]
-    """1 - the mean of the better half, rounded up, of the similarities of the pairs that hold a point in both frusta.
+    """1 - the mean of the better half (rounded up) of a point's similarities, over pairs with the point in both frusta.
 
-    It is `hidden` where no pair does. If half of the views cannot see a point, the other half still can.
+    Where there is no such pair, the cost is `hidden`. The better half is enough: if half of the views cannot see a
+    point, the other half still can.
 
     Parameters
     ----------
@@ -205,14 +206,14 @@ def support(cost, image, first, skipped, fall, radius, out):  # type: ignore[no-
 
 @frozen
 class Fusion:
-    """How the similarities of several pairs become one cost on the rays of the reference view.
+    """The fusion of the similarities of several pairs into one cost on the rays of the reference view.
 
     Parameters
     ----------
     adaptive
-        Grey levels: a pixel's cost is the mean over the window, weighted by exp(-|dI| / adaptive)
-        with |dI| the largest difference to the middle pixel over the colours of the view; 0 = the
-        similarities are those of whole windows.
+        Grey levels. A pixel's cost is a weighted mean over the window, with weights exp(-|dI| / adaptive);
+        |dI| is the largest difference to the middle pixel over the colours of the view. With 0 all pixels
+        of a window have the same weight.
     hidden
         The cost of a point that no other view sees.
     """
@@ -233,12 +234,12 @@ class Fusion:
     def seen_cost(
         self, matcher: Matcher, maps: NDArray[np.float32], threads: int = 1, phases: Features | None = None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Dissimilarity on the reference view's rays as far as other views see the points, and materiality.
+        """Cost on the reference view's rays from the views that see each point, and the point's materiality.
 
-        With d_j the plane in which the ray of view j ends, w_j(k) = max(0, 1 - |k - d_j|) says where
-        it ends and V_j(k) = 1 - sum of w_j(k') over k' > k + 1 what it reaches: a plane does not
-        hide the one behind it, as surfaces may lie between the two. Then, over the pairs and over
-        the views j other than the reference,
+        Let d_j be the plane in which the ray of view j ends. Then w_j(k) = max(0, 1 - |k - d_j|) says where
+        the ray ends, and V_j(k) = 1 - sum of w_j(k') over k' > k + 1 says which points it reaches. A plane
+        does not hide the plane just behind it, because surfaces may lie between the two. With sums over
+        the pairs ij, and over the views j other than the reference view,
 
         - cost = (sum V_i V_j (1 - rho_ij) + 0.5 hidden) / (sum V_i V_j + 0.5),
         - mu = (sum w_j + 0.05) / (sum V_j + 0.5).
@@ -270,7 +271,10 @@ class Fusion:
         phases: Features | None,
         combine: Callable[[NDArray[np.uint8], int, NDArray[np.float32]], None],
     ) -> NDArray[np.float32]:
-        """Similarities by blocks of rows, combined by ``combine(rho, first row, cost)`` and averaged; none is kept."""
+        """Combine similarities block by block of rows, by ``combine(rho, first row, cost)``, and average the costs.
+
+        Similarities are not kept: of all rows they would take too much memory.
+        """
         space, image = matcher.space, matcher.scene.views[matcher.scene.ref]
         features = matcher.phases() if phases is None else phases
         radius = matcher.settings.window // 2 if self.adaptive else 0

@@ -1,4 +1,4 @@
-"""Filling what a method left unanswered."""
+"""Filling the holes of a disparity map: pixels without an answer."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 def fill_from_background(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
     """Fill every hole of a disparity map from the farther side of its row.
 
-    What one view cannot see lies behind what hides it, so a hole takes the smaller of the nearest
-    known disparities to its left and right (the only one, at the ends of a row). A row without
-    any answer then takes the nearest row that has one, of two equally near the upper.
+    An occluded point lies behind the surface that hides it. So a hole takes the smaller of the nearest
+    known disparities to its left and right (the only one, at the ends of a row). A row without any
+    answer then takes the nearest row that has answers; of two equally near rows, the upper one.
 
     Parameters
     ----------

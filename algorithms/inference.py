@@ -1,4 +1,4 @@
-"""Maps of all views of a scene, inferred semi-globally and made to agree: what materiality and its control share."""
+"""Disparity maps of all views, by semi-global matching and mending: the part that materiality and its control share."""
 
 from collections.abc import Callable, Mapping
 
@@ -20,8 +20,8 @@ class Inference:
     Parameters
     ----------
     mending
-        Rounds in which what other views contradict is replaced by what trusted neighbours of its
-        colour say (`mend`); 0 = none.
+        Rounds of mending: a pixel that other views contradict takes the disparity of trusted neighbours of
+        its colour (`mend`). 0 = no mending.
     """
 
     fusion: Fusion = field(factory=Fusion)
@@ -29,12 +29,12 @@ class Inference:
     mending: int = field(default=3, validator=validators.ge(0))
 
     def silent(self, matching: Matching) -> Mapping[str, str]:
-        """The parameters that are not read with windows of this size -> what they take to be read."""
+        """Parameter -> what it needs to have an effect, for those without effect at this window size."""
         return {"adaptive": "window above 1"} if matching.window == 1 else {}
 
     @staticmethod
     def volume_bytes(matcher: Matcher, refined: bool) -> int:
-        """Bytes of the volumes held at once: costs, sums of either sweep, and for `refined` maps materialities."""
+        """Bytes of the volumes held at once: costs, sums of both sweeps and, for `refined` maps, materialities."""
         return (4 if refined else 3) * matcher.ray_bytes
 
     @staticmethod
@@ -43,7 +43,7 @@ class Inference:
         return sum(matcher.with_reference(view).ray_comparisons for view in range(matcher.space.views))
 
     def initial_maps(self, matcher: Matcher, threads: int = 1) -> NDArray[np.float32]:
-        """(views, H, W) maps by the better half of the similarities of each point, as planes of the space; mended."""
+        """(views, H, W) mended maps, as plane indices; costs are from the better half of each point's similarities."""
 
         def cost(one: Matcher, phases: Features) -> NDArray[np.float32]:
             return self.fusion.first_cost(one, threads, phases)
@@ -53,7 +53,7 @@ class Inference:
     def refined_maps(
         self, matcher: Matcher, maps: NDArray[np.float32], material: float, threads: int = 1
     ) -> tuple[NDArray[np.float32], float, float]:
-        """The same by the pairs that see a point, if the rays of all views end where `maps` say.
+        """The same, with costs from the pairs that see a point if the rays of all views end where `maps` say.
 
         The cost of a point is that of `Fusion.seen_cost`, plus material (1 - mu).
 

@@ -1,4 +1,4 @@
-"""Maps of several views that contradict one another, mended from trusted neighbours of the same colour."""
+"""Mending maps of several views that contradict one another, from trusted neighbours of the same colour."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,8 @@ def count_votes(maps, view, tolerance, top, end, agreeing, contradicting):  # ty
     """How many other views agree with each pixel of a view, and how many contradict it.
 
     View j agrees if its disparity at the column where it should see the point is the same within `tolerance`.
-    It contradicts if it sees something farther there, through the point. If it sees something nearer, the point is
-    hidden from it, and it says nothing.
+    It contradicts if its disparity there is farther: it would see through the point. If its disparity there is
+    nearer, the point is occluded in view j, and the view does not vote.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ def vote(found, image, doubtful, trusted, colour, distance, least, step, top, en
 def mend(
     maps: NDArray[np.float32], images: NDArray[np.uint8], pixel: float, rounds: int, threads: int = 1
 ) -> NDArray[np.float32]:
-    """(views, H, W) maps that agree better with one another, without NaN but for a view that is all NaN.
+    """(views, H, W) maps that agree better with one another; without NaN, except in a view that is all NaN.
 
     In every round and view, a pixel is trusted if it has an answer, and at least TRUST times as many views agree with
-    it as contradict it (`count_votes`). All others are doubtful; in the first round those that more views
-    contradict than agree with lose their answer. Doubtful pixels take the weighted median of their trusted
-    neighbours (`vote`). Holes without such neighbours are filled from the background. A view without
-    any trusted pixel is left as it is.
+    it as contradict it (`count_votes`). All other pixels are doubtful. In the first round, a pixel loses its answer
+    if more views contradict it than agree. Doubtful pixels take the weighted median of their trusted neighbours
+    (`vote`). Holes without such neighbours are filled from the background. A view without any trusted pixel is left
+    as it is.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The control of materiality: its similarities, inference and mending, without materiality."""
+"""The control of materiality: the same similarities, inference and mending, but no materiality."""
 
 from collections.abc import Mapping
 
@@ -16,11 +16,11 @@ from matbench.scene import Scene
 class MultiviewSGM:
     """Semi-global matching over 1 - mean rho_ij, over the better half of the pairs with both frusta.
 
-    The better half, rounded up, is chosen for every point: with half of the views hidden from it, the
-    other half still tells. The maps of all views are inferred, and mended where they contradict one
-    another. What materiality gains, it must gain over this: views, planes, pairs, similarities, inference
-    and mending are the same (parameters of `Matching` and `Inference`), only visibility and mu are
-    missing. A second pass would find nothing new, as the better half is the same again.
+    The better half, rounded up, is chosen for every point: even if half of the views cannot see it, the
+    other half can. The maps of all views are inferred, and mended where they contradict one another. This
+    method shows what materiality gains. Views, planes, pairs, similarities, inference and mending are the
+    same (parameters of `Matching` and `Inference`); only visibility and mu are missing. A second pass
+    would change nothing, because the better half would be the same.
     """
 
     matching: Matching = field(factory=Matching)

@@ -1,11 +1,11 @@
-"""Rows shared out to threads: kernels release the interpreter's lock, results never depend on the split."""
+"""Sharing rows among threads: kernels release the interpreter's lock, and results never depend on the split."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 
 def share(rows: int, threads: int) -> int:
-    """Rows a call, where a call costs as much as some rows: eight calls a thread still balance the load."""
+    """Rows per call, if a call costs as much as some rows: eight calls per thread still balance the load."""
     return max(1, -(-rows // (8 * max(1, threads))))
 
 

@@ -1,4 +1,4 @@
-"""Image rows sampled finer than a pixel, so that fine planes have whole-number homologues.
+"""Image rows sampled finer than a pixel, so that matching samples in fine planes have whole-number places.
 
 See docs/concepts/disparity-space.md.
 """

@@ -136,9 +136,9 @@ def aggregate(
 def winner(total, cost):  # type: ignore[no-untyped-def]
     """(H, W) float32 plane index of the least total, to a fraction of a plane by the equiangular fit.
 
-    Planes whose own cost is NaN cannot win; NaN where all are. With S the totals at the winner k and
-    beside it, the fraction is ``(S[k-1] - S[k+1]) / (2 (max(S[k-1], S[k+1]) - S[k]))``; none at the
-    ends of the range, beside an unknown plane, or where S is less beside k.
+    A plane whose own cost is NaN cannot win; the answer is NaN where all costs are. With the totals S at the
+    winner k and beside it, the fraction is ``(S[k-1] - S[k+1]) / (2 (max(S[k-1], S[k+1]) - S[k]))``. There is
+    no fraction at the ends of the range, beside an unknown plane, or if S is less beside k.
     """
     height, width, planes = total.shape
     found = np.empty((height, width), np.float32)
@@ -217,7 +217,7 @@ class SemiGlobal:
         return np.asarray(winner(self.sums(cost, image, threads), cost))
 
     def energy(self, cost: NDArray[np.float32], image: NDArray[np.uint8], planes: NDArray[np.float32]) -> float:
-        """What a map costs per pixel (Hirschmueller 2008, equation 3): `infer` seeks the map of the least energy.
+        """The energy of a map per pixel (Hirschmueller 2008, equation 3); `infer` seeks the map of least energy.
 
         E = sum over pixels of cost(p, D_p) + sum over neighbours, eight around a pixel and each pair once,
         of P1 where their planes differ by one and of P2 where they differ by more.

@@ -1,4 +1,4 @@
-"""Two-view semi-global matching as everybody has it: OpenCV's StereoSGBM."""
+"""Two-view semi-global matching in its best-known implementation: OpenCV's StereoSGBM."""
 
 from collections.abc import Mapping
 from math import ceil, floor
@@ -23,7 +23,7 @@ MODES = {
 
 @frozen
 class SGBM:
-    """OpenCV's StereoSGBM on the field's pair: the peer that everyone knows.
+    """OpenCV's StereoSGBM on the field's pair: a well-known method to compare with.
 
     Minimises along several paths through the image, after H. Hirschmüller, "Stereo processing by
     semiglobal matching and mutual information", IEEE PAMI 30(2), 2008,
@@ -70,7 +70,7 @@ class SGBM:
 
     @property
     def silent(self) -> Mapping[str, str]:
-        """The parameters that are not read beside the others -> what they take to be read."""
+        """Parameter -> what it needs to have an effect, for those without effect beside the others."""
         return {} if self.speckle_window else {"speckle_range": "speckle_window above 0"}
 
     def solve(self, scene: Scene, context: Context) -> Estimate:  # noqa: ARG002 (nothing to seed)
@@ -90,10 +90,10 @@ class SGBM:
     def match(self, left: NDArray[np.uint8], right: NDArray[np.uint8], least: int, largest: int) -> NDArray[np.float32]:
         """Disparities of the left image of a pair, x_right = x_left - d.
 
-        OpenCV answers only where the whole range stays inside the right image. Both images are
-        therefore continued beyond their sides by repeating the edge, so that every pixel is tried.
-        Where fewer columns than half a block are left to answer for, OpenCV's answer varies from call to
-        call; images narrower than a block are therefore made as wide as one.
+        OpenCV answers only where the whole range stays inside the right image. Therefore both images are
+        padded at their sides with repeated edge pixels, so that every pixel is tried. If fewer columns
+        than half a block remain to be answered, OpenCV's result varies from call to call. Therefore
+        images narrower than a block are made as wide as a block.
 
         Parameters
         ----------

@@ -72,9 +72,9 @@ class Matching:
     colour
         Compare colours, or only luma: 0.299 R + 0.587 G + 0.114 B.
     alike
-        Grey levels: a census compares the eight next pixels, and those whose colours are within so many
-        of the middle pixel's in both views (h is scaled up to 48 bits). What lies across a depth jump says
-        nothing about a pixel. 0 compares all 48.
+        Grey levels. A census compares the eight next pixels, and all others whose colours differ from the
+        middle pixel by at most this much in both views (h is scaled up to 48 bits). Pixels across a depth
+        jump say nothing about the middle one. 0 compares all 48.
     """
 
     views: int = field(default=9, validator=all_or_several)
@@ -89,7 +89,7 @@ class Matching:
 
     @property
     def silent(self) -> Mapping[str, str]:
-        """The parameters that this similarity does not read -> what they take to be read."""
+        """Parameter -> what it needs to have an effect, for those that this similarity does not read."""
         form = self.similarity
         takes = {
             "sigma": (form in ("ssd", "rms"), "similarity=ssd or rms"),
@@ -153,7 +153,7 @@ class Matcher:
         return cls(chosen, indices, space, chosen_pairs, rows, slopes, bits, masks, settings)
 
     def with_reference(self, view: int) -> "Matcher":
-        """The same views with another reference view; of ``reference`` pairs, it is part of every one."""
+        """The same views with another reference view; with ``reference`` pairs, the pairs change with it."""
         scene = evolve(self.scene, ref=view, regions={})
         return evolve(self, scene=scene, pairs=pairs(self.space.views, self.settings.pairs, view))
 
@@ -178,10 +178,10 @@ class Matcher:
         return 4 * self.space.rows * self.space.width * self.space.planes
 
     def spans(self, i: int, j: int) -> NDArray[np.int64]:
-        """(planes, 6) for each plane, where in a volume the points lie that are in the frusta of both views.
+        """(planes, 6) for each plane, the place in a volume of the points that are in the frusta of both views.
 
-        Their first column and how many columns they are; then phase and sample of the first of them in view i,
-        and the same in view j. The phase is always 0 here: samples are not sorted by it.
+        The six numbers are: the first column, the number of columns, phase and sample of the first column in
+        view i, and the same in view j. The phase is always 0 here: samples are not sorted by phase.
         """
         space = self.space
         plane = np.arange(space.first, space.last + 1)

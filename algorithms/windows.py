@@ -22,7 +22,7 @@ TILE = 4  # planes
 
 
 class Features(NamedTuple):
-    """What is compared of the views, or without the first axis of one view; samples are sorted by `by_phase`.
+    """The features of the views, or of one view without the first axis; samples are sorted by `by_phase`.
 
     Parameters
     ----------
@@ -53,13 +53,14 @@ class Criterion(NamedTuple):
     measure, shape
         Which differences are averaged (`SQUARES`, ...), and how their mean becomes a similarity (`LINEAR`, ...).
     rate
-        Of the exponential, or of the linear fall.
+        How fast the similarity falls, exponentially or linearly.
     limit
-        The most that the colours of a pixel may differ: of mean squares, or of the sum of absolutes.
+        The largest colour difference of a pixel that counts: a mean of squares, or a sum of absolute values.
     masked
         Empty to compare all bits of the census; else only those set in the `masks` of both views.
     channels, taps
-        As long as there are channels, and taps along a side of the window: the compiler counts tuples.
+        Tuples as long as there are channels, and taps along a side of the window. Their lengths are known to the
+        compiler, so that it can unroll loops.
     """
 
     measure: int
@@ -143,7 +144,7 @@ def _mixed_difference(  # type: ignore[no-untyped-def]
 
 @helper
 def _sum_rows(ring, taps, out):  # type: ignore[no-untyped-def]
-    """out = sum of all rows of `ring`; the tuple `taps` is as long as they are many."""
+    """out = sum of all rows of `ring`; the tuple `taps` is as long as there are rows."""
     zero = np.float32(0)
     for x in range(np.uintp(out.size)):
         total = zero

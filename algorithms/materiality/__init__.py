@@ -1,4 +1,4 @@
-"""The materiality map (ICIP 2014): where the surfaces of a scene are, as a fuzzy map over disparity space.
+"""The materiality map (ICIP 2014): the surfaces of a scene as a fuzzy map over disparity space.
 
 Equations are numbered as in docs/concepts/materiality.md.
 """

@@ -26,7 +26,7 @@ def _seen_rays(mu, view, first, origin, fineness, top, end, seen):  # type: igno
 
 
 def seen_rays(mu: NDArray[np.float32], space: DisparitySpace, view: int, threads: int = 1) -> NDArray[np.float32]:
-    """(H, W, planes) float32 mu V_view on the pixel rays of a view: where each ray ends. It sums to at most 1 a ray."""
+    """(H, W, planes) float32 mu V_view on the pixel rays of a view: where each ray ends. Sums along a ray are <= 1."""
     seen = np.empty((space.rows, space.width, space.planes), np.float32)
     over_rows(
         lambda top, end: _seen_rays(mu, view, space.first, space.origin, space.fineness, top, end, seen),
@@ -58,10 +58,10 @@ def by_ray(seen: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def by_plane(mu: NDArray[np.float32], space: DisparitySpace, view: int, target: float) -> NDArray[np.float32]:
-    """(H, W) float32 plane index of the nearest of the `target` most material points of each epipolar plane.
+    """(H, W) float32 plane index of the nearest point on each ray, among the `target` most material points.
 
-    This is the paper's rule, which takes every epipolar plane alone. NaN where a ray meets none of these points.
-    Of equal materialities the nearer points are taken first.
+    These are chosen for each epipolar plane on its own, as in the paper. NaN where a ray meets none of them.
+    Among points of equal materiality, the nearer ones are chosen first.
     """
     found = np.full((space.rows, space.width), np.nan, np.float32)
     count = min(round(target), space.planes * space.columns)
@@ -113,11 +113,11 @@ def visible_cost(
     hidden: float,
     threads: int = 1,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Dissimilarity on the pixel rays of a view, as far as the other views see the points.
+    """Cost on the pixel rays of a view, from the other views that see the points.
 
-    cost(s) = (sum over pairs V_ij (1 - rho_ij) + PRIOR hidden) / (sum over pairs V_ij + PRIOR),
-    with V_ij the product of the visibilities of i and j, that of `view` itself left out: all points of its
-    ray are candidates. A plane does not hide the one behind it, as surfaces may lie between the two.
+    cost(s) = (sum over pairs V_ij (1 - rho_ij) + PRIOR hidden) / (sum over pairs V_ij + PRIOR).
+    V_ij is the product of the visibilities of i and j. That of `view` itself is left out: all points of its
+    ray are candidates. A plane does not hide the plane just behind it, because surfaces may lie between the two.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def add_view(found, view, first, origin, fineness, top, end, ended, reached):  #
 
 
 def consensus(space: DisparitySpace, maps: NDArray[np.float32], threads: int = 1) -> NDArray[np.float32]:
-    """(rows, planes, columns) float32: of the rays that reach a point, the share that ends there.
+    """(rows, planes, columns) float32: the share of the rays reaching a point that end there.
 
     mu = (sum over i w_i + 0.05) / (sum over i V_i + 0.5), with w_i and V_i as in `Fusion.seen_cost`. Between
     the pixels of a row both are interpolated linearly.

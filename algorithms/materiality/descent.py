@@ -20,14 +20,14 @@ class Descent:
     Parameters
     ----------
     passes
-        Sweeps over all points, at most.
+        At most this many passes over all points.
     accelerated
         FISTA (Beck & Teboulle 2009): each pass starts from now + beta (now - before); otherwise beta = 0.
     step
         Length of a gradient step.
     tolerance
-        Stop when a pass lowers the energy by less than this share; where rows descend on their own, a row
-        stops by its own energy. 0 = never.
+        Stop when a pass lowers the energy by less than this share of it. Where rows descend independently,
+        each row stops by its own energy. 0 = never.
     threads
         The result does not depend on it.
     """
@@ -43,9 +43,9 @@ class Descent:
     ) -> tuple[Floats, dict[str, list[float]], int, int]:
         """Descend from `mu`, which is overwritten.
 
-        An accelerated pass whose energy exceeds that of the last accepted pass is rejected, and the
-        next one starts without momentum. If the energy rises even so, the step is halved and the
-        point is accepted as a restart. Where nothing couples rows, every row does so on its own.
+        An accelerated pass is rejected if its energy exceeds that of the last accepted pass, and the
+        next pass starts without momentum. If the energy rises even then, the step is halved and the
+        point is accepted as a restart. Where nothing couples rows, every row does this independently.
 
         Parameters
         ----------

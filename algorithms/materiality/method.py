@@ -36,15 +36,15 @@ class Materiality:
       along sum w (mu(x + 1) - mu(x))^2 (8), edge weights w = exp(-|dI| / edge),
 
     by projected gradient with the exact derivative (9), and takes the disparities of the reference view from mu.
-    The default solver is a fixed point instead (13-15): the maps of all views say how far their rays
-    reach, so V and mu follow; with these all maps are inferred anew, as far as other views see each point.
-    A pass lowers the energy of the maps (`SemiGlobal.energy`) under the costs of that pass: ``energy_before``
-    and ``energy`` in the history, with the share of pixels that ``changed``. As semi-global matching only comes
-    near the least, a pass after the first may end up to 2 % above where it began.
+    The default solver is a fixed-point iteration instead (13-15). The maps of all views say where their rays
+    end; V and mu follow from that. Then all maps are inferred again, with costs from the views that see each
+    point. A pass lowers the energy of the maps (`SemiGlobal.energy`) under the costs of that pass. The history
+    holds it as ``energy_before`` and ``energy``, with the share of pixels that ``changed``. Semi-global matching
+    only approximates the minimum, so a pass after the first may end up to 2 % above where it began.
     Numbers are those of the equations in docs/concepts/materiality.md.
 
-    Its parameters are in four groups, given by their own names: ``Materiality(pairs="all", passes=2)``. One that
-    is not read beside the others, such as `sharpness` without ``start=soft``, is refused.
+    Its parameters are in four groups, but are given by their own names: ``Materiality(pairs="all", passes=2)``. A
+    parameter without effect beside the others, such as `sharpness` without ``start=soft``, is refused.
 
     Raises
     ------
@@ -81,11 +81,11 @@ class Materiality:
 
     @property
     def silent(self) -> Mapping[str, str]:
-        """The parameters that are not read beside the others -> what they take to be read."""
+        """Parameter -> what it needs to have an effect, for those without effect beside the others."""
         return {**self.inference.silent(self.matching), **silent(self.matching, self.solver, self.energy)}
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
-        """The reference view's map, the materialities, and what every pass came to."""
+        """The reference view's map, the materialities, and the history of the passes."""
         matcher = Matcher.of(scene, self.matching)
         return self._descent(matcher, context) if self.solver.descends else self._fixed_point(matcher, context)
 

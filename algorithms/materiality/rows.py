@@ -1,4 +1,4 @@
-"""Descent of the energy where nothing couples rows: all passes over one row while it is in the cache, then the next."""
+"""Descent of the energy where nothing couples rows: all passes over a row while it is in the cache, then the next."""
 
 import numpy as np
 
@@ -16,10 +16,10 @@ ROW = np.dtype([(name, np.float64) for name in ("data", "count", "adjacent", "mo
 
 @kernel
 def follow(total, last, momentum, beta, step, accelerated):  # type: ignore[no-untyped-def]
-    """Whether a pass is accepted, and how the next one goes on.
+    """Decide whether a pass is accepted, and how the next one continues.
 
-    If the energy rises by more than rounding, a pass with momentum is rejected and the next one has none. A pass
-    without momentum is accepted all the same, but the step is halved, and energies are compared anew from there.
+    If the energy rises by more than rounding, a pass with momentum is rejected, and the next one has none. A pass
+    without momentum is accepted even so, but the step is halved, and later energies are compared with this one.
 
     Parameters
     ----------
