@@ -243,6 +243,7 @@ def score(
     known = mask & np.isfinite(truth)
     signed = signed_error_map(estimate, truth, pair_steps)[known]
     given: dict[str, Any] = {"absolute": np.abs(signed), "signed": signed}
+    # all metrics share these arrays: one that writes to them must fail rather than change the next one's errors
     for errors in given.values():
         errors.setflags(write=False)
     if scene is not None:

@@ -102,6 +102,7 @@ def predict(view: NDArray[np.uint8], disparity: NDArray[np.float32], steps: floa
     there = carry(disparity, steps)
     rows, columns = np.nonzero(np.isfinite(there))
     place = np.clip(columns + steps * there[rows, columns], 0, view.shape[1] - 1)
+    # at the right edge there is no next pixel: interpolate between the last two
     left = np.minimum(place.astype(np.intp), view.shape[1] - 2)
     share = (place - left)[:, None]
     out = np.full(view.shape, np.nan)

@@ -104,6 +104,7 @@ def reliability(rays: Rays) -> pd.DataFrame:
     points), ``observed`` (share of them in which the surface is), ``points``.
     """
     predicted, there = outcomes(rays)
+    # a materiality of exactly 1 belongs to the last bin
     place = np.minimum((predicted * BINS).astype(np.intp), BINS - 1)
     points = np.bincount(place, minlength=BINS)
     filled = points > 0

@@ -39,6 +39,7 @@ def carry(disparity: NDArray[np.float32], steps: float) -> NDArray[np.float64]:
 
     def put(rows: NDArray[np.intp], columns: NDArray[np.float64], found: NDArray[np.float64]) -> None:
         inside = (columns >= 0) & (columns < width)
+        # several surfaces may come to one column: `at` takes all of them into account, an assignment only one
         np.maximum.at(nearest, (rows[inside], columns[inside].astype(np.intp)), found[inside])
 
     torn = known.copy()

@@ -86,7 +86,7 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
     methods = list({str(cell.method): cell.method for cell in plan.cells}.values())
     by_label = {(method.algorithm, method.changed): method for method in methods}
     results = results[counted(results)]
-    if "answered" not in results:
+    if "answered" not in results:  # tables of earlier versions
         results = results.assign(answered=float("nan"))
     rows = []
     for algorithm, levels in factors(methods).items():
@@ -95,6 +95,7 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
             wide = _levels_side_by_side(mine, by_label, factor)
             for level in values[1:]:
                 base, other = text({factor: values[0]}), text({factor: level})
+                # a level whose cells all failed has no column
                 if base not in wide["value"] or other not in wide["value"]:
                     continue
                 change = _by_scene(wide["value"][other] - wide["value"][base])

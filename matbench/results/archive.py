@@ -70,8 +70,10 @@ def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
     store = Store(folder)
     store.check_place()
     plan = store.plan()
+    # the folder "." has no name of its own
     named = folder if folder.name else folder.resolve()
     place = out or named.with_name(f"{named.name}.zip")
+    # an earlier export may be replaced, but never a file of another kind
     if place.exists() and not _is_archive(place):
         raise UserError(f"{str(place)!r} is there already and is no exported run: name another file by --out")
     with locked(folder):
@@ -156,6 +158,7 @@ def _is_plain(path: Path) -> bool:
 def _write(place: Path, folder: Path, paths: list[Path]) -> None:
     files = {p.relative_to(folder).as_posix(): {"sha256": _sha256(p), "bytes": p.stat().st_size} for p in paths}
     manifest = json.dumps({"matbench": __version__, "files": files}, indent=1)
+    # written beside its place and then moved: an archive is never seen half-written
     with tempfile.NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
         draft = Path(file.name)
         try:

@@ -133,6 +133,7 @@ def fault(plan: Plan, store: Store) -> str:
         return f"they were made by another scorer ({found.scorer}, not {digest()})"
     if any(_sha256(store.folder / name) != found.tables.get(name, "") for name in TABLES):
         return "they are not as they were written"
+    # without reading maps: outcomes hold their digests
     outcomes = {cell.key: store.outcome(cell) for cell in plan.cells}
     if found.cells != _cells(store, {key: outcome for key, outcome in outcomes.items() if outcome is not None}):
         return "cells were computed since"
@@ -140,6 +141,7 @@ def fault(plan: Plan, store: Store) -> str:
 
 
 def _cells(store: Store, outcomes: Mapping[str, Outcome]) -> str:
+    # outcomes hold no digest of volumes: the size tells at least whether one was kept
     told = [(key, _json.unstructure(o), _size(store, key) if o.has_volume else 0) for key, o in outcomes.items()]
     return plans.digest(sorted(told, key=itemgetter(0)))
 

@@ -64,12 +64,13 @@ def judged(cell: Cell, asked: int, solves: Iterable[Solved]) -> Repeats:
         solved += one.outcome.status == "ok"
         timed += [one.outcome] if one.outcome.status == "ok" and one.outcome.seconds is not None else []
         answers |= {one.outcome.maps} - {""}
+        # a failure of the first solve is the status of the cell itself
         if one.cell.repeat and one.outcome.status not in FINAL and failed is None:
             failed = one.cell, one.outcome
         if one.maps and first is None:
             first = one
             alike = one.outcome.maps
-        elif one.maps and first is not None and one.outcome.maps != alike:
+        elif one.maps and first is not None and one.outcome.maps != alike:  # equal digests need no look at pixels
             unlike = unlike | _unlike(first, one)
     timed = [outcome for outcome in timed if outcome.alone and not outcome.doubt] or timed
     return Repeats(cell, asked, solved, len(answers), float(unlike.mean()), failed, tuple(timed))

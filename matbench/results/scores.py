@@ -91,6 +91,7 @@ def metrics() -> tuple[AnyMetric, ...]:
         for metric in plugins.own_metrics(file):
             if not isinstance(metric, AnyMetric):
                 raise UserError(f"{file}: {type(metric).__name__} is no metric: make it of matbench.Metric")
+            # an equal metric under the same name is no clash: a file may import a built-in one
             if found.setdefault(metric.name, metric) != metric:
                 raise UserError(f"{file}: the name of metric {metric.name!r} is taken; give it another one")
     return tuple(found.values())
@@ -119,6 +120,7 @@ def broken_metrics() -> Mapping[str, str]:
 def _installed() -> tuple[tuple[AnyMetric, ...], Mapping[str, str]]:
     found: dict[str, AnyMetric] = {}
     broken: dict[str, str] = {}
+    # built-in metrics first: no plug-in can take one of their names
     by_source = sorted(plugins.installed("metrics").values(), key=lambda p: p.source != "matbench-stereo")
     for plugin in by_source:
         try:
@@ -192,6 +194,7 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
 
     for cell, *others in plan.questions:
         solved, scene = read(cell), scenes[cell.scene]
+        # `map` reads the repeats one at a time: the maps of all of them might not fit into memory
         repeats = judged(cell, 1 + len(others), chain([solved], map(read, others))) if others else None
         lines.append(_line(solved, repeats))
         unsteady += [repeats.unsteady] if repeats is not None and repeats.unsteady else []
@@ -324,6 +327,7 @@ def _line(solved: Solved, repeats: Repeats | None) -> tuple[object, ...]:
     status, reason = outcome.status, outcome.reason
     if repeats is not None and repeats.failed is not None and status == "ok":
         repeat, failed = repeats.failed
+        # `place` too: the log to read is that of the repeat
         status, reason, place = failed.status, f"repeat {repeat.repeat}: {failed.reason}", place.with_name(repeat.key)
     if reason and status != "skipped":
         reason += _log_of(place)

@@ -69,6 +69,7 @@ def standing(folder: Path) -> Standing:
     store = Store(folder)
     plan = store.plan()
     outcomes = {cell.key: store.outcome(cell) for cell in plan.cells}
+    # a killed process leaves its facts behind; they are true only while the lock is held
     work = Work.read(folder) if is_locked(folder) else None
     now = time.time()
     begun = work.running if work else {}

@@ -186,6 +186,7 @@ def _sweeps_of(option: str, of: str, cells: pd.DataFrame, results: pd.DataFrame)
     out = []
     for name, part in cells.groupby("setting", sort=False):
         asked = part.groupby(["curve", "base", "repeat"])["value"].agg(frozenset)
+        # every set of values that some point has makes a sweep; points that have more values take part in it, too
         for values in sorted({v for v in asked if len(v) >= LEAST_VALUES}, key=lambda v: (-len(v), sorted(v))):
             # a point is one curve on one scene in one repeat
             points = asked.index[[values <= v for v in asked]]
@@ -203,6 +204,7 @@ def _sweep(
     scored = results.assign(params=results["params"].fillna(""), score=kept, answered=answered)
     scored = scored.drop(columns="value")
     joined = cells.merge(scored, on=["algorithm", "params", "scene", "seed"], how="left")
+    # after the left join, a cell without results has no metric: one such cell leaves its scene out
     done = joined["metric"].notna().groupby(joined["base"], sort=False).all()
     good = joined[joined["base"].map(done)]
     methods = {str(row["curve"]): row["method"] for row in cells.drop_duplicates("curve").to_dict("records")}
@@ -240,6 +242,7 @@ def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.Dat
     """The means of every curve and value over the scenes that have all of them."""
     heads = ["region", "metric", "unit"]
     groups = good.groupby([*heads, "curve", "value", "base"], sort=False)
+    # a mean skips missing numbers; but a scene that lacks one of its repeats must have no mean
     scores = groups["score"].mean().where(groups["score"].count() == groups.size())
     per_scene = scores.unstack("base").sort_index(level="value")
     # a curve without any score, as of a method that never answers, takes no scene from the others
@@ -255,6 +258,7 @@ def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.Dat
             for (*head, curve, value), line in zip(part.index, _lines(part, over), strict=True):
                 rows.append((*labels[str(curve)], value, *head, *line))
     found = pd.DataFrame(rows, columns=list(COLUMNS))
+    # rows in the order in which the run has its methods, regions and metrics, not in that of the alphabet
     places = {"algorithm": [a for a, _ in labels.values()], "params": [p for _, p in labels.values()]}
     places |= {name: list(good[name].unique()) for name in ("region", "metric")}
     order = [found[name].map(list(dict.fromkeys(places[name])).index) for name in places]

@@ -31,7 +31,7 @@ from matbench.runs.outcome import Outcome
 KEY = re.compile(r"[0-9a-f]{16}")
 """What a cell's folder is called."""
 _DRAFT = re.compile(r"\.([0-9a-f]{16}|removed)\.\w+")
-_ABSENT = (ENOENT, ENOTDIR, EISDIR, ELOOP)
+_ABSENT = (ENOENT, ENOTDIR, EISDIR, ELOOP)  # no such file; after any other error there may well be one
 _MAP_BYTES = 1 << 32  # of all maps of a cell, unpacked
 
 _json = make_converter()
@@ -90,6 +90,7 @@ def read_maps(path: Path) -> dict[int, NDArray[np.float32]]:
     with path.open("rb") as file:
         try:
             with zipfile.ZipFile(file) as archive:
+                # a small archive may unpack to more than the memory holds
                 if sum(info.file_size for info in archive.infolist()) > _MAP_BYTES:
                     raise ValueError(f"{path} unpacks to more than {_MAP_BYTES} bytes")
             file.seek(0)
@@ -147,7 +148,7 @@ class Store:
             store.check(plan)
             folder.mkdir(parents=True, exist_ok=True)
             with locked(folder):
-                store.check(plan)
+                store.check(plan)  # once more: before the lock, another process may have begun a run here
                 store.write_plan(plan, command)
         except OSError as error:
             raise UserError(f"output folder {str(folder)!r} cannot be used: {error.strerror}") from error
