@@ -72,7 +72,7 @@ for _name, _help in COMMANDS.items():
 
 def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0 all well, 1 something failed, 2 wrong usage, 3 a regression, 130 interrupted."""
-    warnings.formatwarning = _warning  # type: ignore[assignment]  # its last parameter has another name
+    warnings.formatwarning = _warning
     try:
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except UserError as error:

@@ -178,9 +178,7 @@ def _publish(
             voice.say(f"does not repeat itself: {line}")
         doubtful = sum(outcome.is_doubtful for outcome in found.outcomes.values())
         if ready.settings.steady and doubtful:
-            voice.say(
-                f"{doubtful} cells are still in doubt, others took processors again: the same command retries"
-            )
+            voice.say(f"{doubtful} cells are still in doubt, others took processors again: the same command retries")
         if say_paths:
             _say_paths(ready, written, voice)
     return cells

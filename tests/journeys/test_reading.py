@@ -1,5 +1,6 @@
 """How often the maps of a run are read: the time of a run of ten thousand cells hangs on it."""
 
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +31,14 @@ class Rolls:
 
 
 _opened: Counter[str] | None = None
+
+
+def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+    if event == "open" and _opened is not None and str(arguments[0]).endswith("disparity.npz"):
+        _opened[Path(str(arguments[0])).parent.name] += 1
+
+
+sys.addaudithook(_hear)  # it hears every way to open a file, and stays as long as the process
 
 
 class Reads:
