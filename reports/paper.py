@@ -335,23 +335,22 @@ def latex(made: Sheet) -> str:
     """A floating table for ``\\usepackage{booktabs}`` and ``\\usepackage[T1]{fontenc}``, notes below it."""
     marks = {0: "{}", 1: r"\textbf{{{}}}", 2: r"\underline{{{}}}", NOT_RANKED: "{}" + tables.ASIDE}
     heads, left = _heads(made), 2 if made.has_scenes else 1
-    # not pandas' Styler, as in `switches`: it sets no rule between the scenes and no notes below the table
+    rows: list[list[str]] = []
+    for is_new, row in _rows(made):
+        # a number is set in mathematics only where it has a sign
+        cells = [marks[place].format(re.sub(r"^\{-\}(?=\d)", r"$-$", tex(text))) for text, place in row]
+        if is_new and rows:  # pandas sets one rule, below the heads
+            cells[0] = rf"\midrule {cells[0]}"
+        rows.append(cells)
+    body = pd.DataFrame(rows, columns=list(map(tex, heads))).style.hide(axis="index")
     lines = [
         r"% needs \usepackage[T1]{fontenc}, \usepackage{textcomp} and \usepackage{booktabs}",
         r"\begin{table}",
         r"\centering\footnotesize",
         rf"\caption{{{tex(made.caption)}}}",
         rf"\label{{tab:{re.sub('[^A-Za-z0-9]+', '-', made.metric).strip('-')}}}",
-        rf"\begin{{tabular}}{{{'l' * left + 'r' * (len(heads) - left)}}}",
-        r"\toprule",
-        " & ".join(map(tex, heads)) + r" \\",
+        body.to_latex(hrules=True, column_format="l" * left + "r" * (len(heads) - left)).rstrip(),
+        r"\par\smallskip",
     ]
-    for is_new, row in _rows(made):
-        if is_new:
-            lines.append(r"\midrule")
-        # a number is set in mathematics only where it has a sign
-        cells = [marks[place].format(re.sub(r"^\{-\}(?=\d)", r"$-$", tex(text))) for text, place in row]
-        lines.append(" & ".join(cells) + r" \\")
-    lines += [r"\bottomrule", r"\end{tabular}", r"\par\smallskip"]
     lines += [rf"\parbox{{\linewidth}}{{\footnotesize {tex(note)}}}\par" for note in _told(made)]
     return "\n".join([*lines, r"\end{table}"]) + "\n"

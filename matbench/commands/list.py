@@ -95,15 +95,15 @@ def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
             | ({"group": one.group} if one.group else {})
             for name, one in known.items()
         },
-        "reads": _reads(plugin.name, cls),
+        "reads": _reads(plugin, cls),
     }
 
 
-def _reads(name: str, cls: type) -> list[str]:
+def _reads(plugin: plugins.Plugin, cls: type) -> list[str]:
     """The files that a method with its defaults says it reads; none where something must be given, or is wrong."""
     if hasattr(cls, "reads") or hasattr(cls, "code_files"):  # else it need not be made
         with suppress(UserError):
-            return [str(path) for path in plugins.declared(name, parameters.build(name, cls, {}))]
+            return [str(path) for path in plugins.declared(plugin.name, plugin.make({}))]
     return []
 
 
