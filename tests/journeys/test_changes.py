@@ -53,7 +53,7 @@ def test_what_changes_decides_what_is_done_again(tmp_path: Path, monkeypatch: py
         sys.modules.pop("extra", None)
         importlib.invalidate_caches()
         shutil.rmtree(site / "__pycache__", ignore_errors=True)
-        for cached in (plugins.installed, plugins.code_digest, scores._metrics, freshness.digest):
+        for cached in (plugins.installed, plugins.code_digest, scores._installed, freshness.digest):
             cached.cache_clear()
 
     def prepared(write: bool = False) -> comparison.Comparison:
