@@ -45,7 +45,7 @@ def copy(values, row):  # type: ignore[no-untyped-def]
 
 @helper
 def _dim(through, mu, one, beyond):  # type: ignore[no-untyped-def]
-    """What is seen one plane further: V (1 - mu)."""
+    """The visibility one plane further away: V (1 - mu)."""
     for x in range(through.size):
         beyond[x] = through[x] * (one - mu[x])
 
@@ -185,9 +185,9 @@ def match(mu, vi, vj, rho, full, pull_i, pull_j):  # type: ignore[no-untyped-def
 
 @helper
 def shade(mu, through, slope, pull, behind):  # type: ignore[no-untyped-def]
-    """One view after all its pairs: A = g + (1 - mu) A; its pull is spent and set to 0.
+    """Finish one view after all its pairs: A = g + (1 - mu) A. Its pull is then used up and set to 0.
 
-    Every pair adds r V_i V_j to the slope once for each of its two views: half of it each time.
+    The slope gains r V_i V_j of a pair in two halves, one with each of its views.
     """
     zero, half = mu.dtype.type(0), mu.dtype.type(0.5)
     for x in range(mu.size):
@@ -211,7 +211,7 @@ def descend(mu, slope, y, k, step, bias, new, slopes):  # type: ignore[no-untype
 
 @helper
 def tie(mu, above, below, w_above, w_below, w_along, across, along, slope):  # type: ignore[no-untyped-def]
-    """Part of E_smooth (equation 8) of one plane of a row: what ties it to the next row and along itself.
+    """The part of E_smooth (equation 8) that ties one plane of a row to the next row, and its columns to one another.
 
     Parameters
     ----------

@@ -65,24 +65,24 @@ class Energy:
 
     @property
     def safe_step(self) -> float:
-        """Below the inverse of the largest curvature of the terms that couple many points (equation 11)."""
+        """A step length below the inverse of the largest curvature of the terms that couple many points (equation 11)."""
         _, planes, columns = self.space.shape
         counting = 2 * self.count * planes * columns / self.target
         return 1 / (counting + 8 * (self.across + self.along) + 2 * len(self.pairs))
 
     @property
     def tied(self) -> bool:
-        """Whether adjacent points are tied to one another."""
+        """Does a term tie adjacent points to one another?"""
         return self.across > 0 or self.along > 0
 
     @property
     def uncoupled(self) -> bool:
-        """Whether no term has points of several rows."""
+        """Can each row be minimised alone, as no term joins points of several rows?"""
         return self.per_row and not self.across
 
     @property
     def pressure(self) -> float:
-        """The count term's derivative for one more point than N: 2 lambda / N."""
+        """The derivative of the count term where there is one point more than N: 2 lambda / N."""
         return 2 * self.count / self.target
 
     def terms(self, kind: type[np.floating]) -> tuple[Data, Pairs, Ties]:

@@ -61,9 +61,9 @@ class Pairs(NamedTuple):
     any_views
         (pairs, 2) views of each pair.
     links
-        Consecutive views: a tuple as long as there are pairs, all taken in one loop.
+        For consecutive views: a tuple with one element for each pair. One loop takes all of them.
     rest
-        Consecutive views: a tuple as long as the pairs that are left when loops have taken `LINKS` at a time.
+        For consecutive views: a tuple with one element for each pair that remains after loops of `LINKS` pairs.
     """
 
     any_views: NDArray[np.int64] | None
@@ -121,7 +121,7 @@ class Room(NamedTuple):
 
     @classmethod
     def of(cls, space: DisparitySpace, kind: np.dtype[np.floating]) -> "Room":
-        """One for scenes with that space and materialities of that type."""
+        """A workspace for scenes of that space and materialities of that type."""
         wide = 2 * space.columns - space.samples
         depth = max(1, min(space.planes, LAYER // (space.views * wide)))
         shapes = (
@@ -154,7 +154,7 @@ def _extrapolate(now, before, beta, out):  # type: ignore[no-untyped-def]
 
 @helper
 def _extrapolate_row(now, before, beta, out):  # type: ignore[no-untyped-def]
-    """The same for all planes of a row. `out` may be wider: values go to its middle columns, the rest is left alone."""
+    """The same for all planes of a row. `out` may be wider: its middle columns are written, the others stay as they are."""
     total = 0.0
     planes, columns = now.shape
     margin = (out.shape[1] - columns) // 2
@@ -206,9 +206,9 @@ def _match_pairs(mu, seen, rho, k, pairs, slide, origin, samples, full, pulls): 
 def _pass_plane(  # type: ignore[no-untyped-def]
     y, k, above, here, below, rays, data, any_views, links, rest, weights, ties, room, step, offset, new, slopes, sums
 ):
-    """One plane of a row: `sums`, the energies of pairs and ties so far, and these with the plane's added.
+    """Take in one plane of a row. `sums` are the energies of pairs and ties so far; returned with those of the plane.
 
-    What may be None is an argument of its own: only then does the compiler drop what does not happen.
+    What may be None is an argument of its own. Only then can the compiler leave out the code that works on it.
     """
     paired, tied = sums
     _, columns = above.shape
