@@ -65,7 +65,7 @@ class Energy:
 
     @property
     def safe_step(self) -> float:
-        """A step length below the inverse of the largest curvature of the terms that couple many points (equation 11)."""
+        """A step below the inverse of the largest curvature of the terms that couple many points (equation 11)."""
         _, planes, columns = self.space.shape
         counting = 2 * self.count * planes * columns / self.target
         return 1 / (counting + 8 * (self.across + self.along) + 2 * len(self.pairs))

@@ -154,7 +154,7 @@ def _extrapolate(now, before, beta, out):  # type: ignore[no-untyped-def]
 
 @helper
 def _extrapolate_row(now, before, beta, out):  # type: ignore[no-untyped-def]
-    """The same for all planes of a row. `out` may be wider: its middle columns are written, the others stay as they are."""
+    """The same for all planes of a row. Only the middle columns of `out` are written if it is wider."""
     total = 0.0
     planes, columns = now.shape
     margin = (out.shape[1] - columns) // 2
@@ -206,7 +206,7 @@ def _match_pairs(mu, seen, rho, k, pairs, slide, origin, samples, full, pulls): 
 def _pass_plane(  # type: ignore[no-untyped-def]
     y, k, above, here, below, rays, data, any_views, links, rest, weights, ties, room, step, offset, new, slopes, sums
 ):
-    """Take in one plane of a row. `sums` are the energies of pairs and ties so far; returned with those of the plane.
+    """Take in one plane of a row; `sums`, the energies of pairs and ties, with those of the plane added.
 
     What may be None is an argument of its own. Only then can the compiler leave out the code that works on it.
     """
