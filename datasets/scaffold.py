@@ -45,7 +45,7 @@ class Draft:
     remarks: tuple[str, ...]
 
 
-def write(folder: Path, disparities: tuple[float, float] | None = None, replace: bool = False) -> Draft:
+def write_scene_toml(folder: Path, disparities: tuple[float, float] | None = None, replace: bool = False) -> Draft:
     """Write ``scene.toml`` for the images of a folder.
 
     Parameters

@@ -203,7 +203,7 @@ def new(
 
     console = Console()
     with console.status("matching features"):
-        draft = scaffold.write(folder, disparities, force)
+        draft = scaffold.write_scene_toml(folder, disparities, force)
     for remark in draft.remarks:
         console.say(f"• {remark}")
     console.say(f"written: {draft.path}")

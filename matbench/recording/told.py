@@ -29,7 +29,7 @@ class Told:
     estimate: Estimate
 
 
-def write(path: Path, told: Told) -> None:
+def write_told(path: Path, told: Told) -> None:
     """Write what was told to a new file."""
     arrays: dict[str, NDArray[Any]] = {}
 
@@ -45,8 +45,8 @@ def write(path: Path, told: Told) -> None:
     np.savez(path, **{_FACTS: np.array(facts)}, **arrays)  # type: ignore[arg-type]  # names are those above
 
 
-def read(path: Path) -> Told:
-    """What `write` wrote.
+def read_told(path: Path) -> Told:
+    """What `write_told` wrote.
 
     Raises
     ------

@@ -19,7 +19,7 @@ def main(path: str, name: str, data: str = "", *files: str) -> None:
         The users' own files that may hold the dataset.
     """
     try:
-        views_only.write(load_scene(name, data or None, files), Path(path))
+        views_only.write_views(load_scene(name, data or None, files), Path(path))
     except UserError as error:
         sys.exit(str(error))
 

@@ -28,7 +28,7 @@ def without_truth(scene: Scene) -> Scene:
     return evolve(scene, truth={}, regions={}, visible={}, held_out=None)
 
 
-def write(scene: Scene, path: Path) -> None:
+def write_views(scene: Scene, path: Path) -> None:
     """Write what a method may see of a scene: views, labels, reference view and range."""
     facts = {
         "name": scene.name,
@@ -40,8 +40,8 @@ def write(scene: Scene, path: Path) -> None:
     np.savez(path, views=scene.views, facts=np.array(json.dumps(facts)))
 
 
-def read(path: Path) -> Scene:
-    """The scene in a file that `write` wrote: without truth, regions and visibilities."""
+def read_views(path: Path) -> Scene:
+    """The scene in a file that `write_views` wrote: without truth, regions and visibilities."""
     with np.load(path, allow_pickle=False) as arrays:
         views, facts = arrays["views"], json.loads(str(arrays["facts"]))
     return Scene(
@@ -83,4 +83,4 @@ def from_another_process(name: str, data: str | Path | None, files: Sequence[Pat
         if done.returncode:
             said = done.stderr.strip().splitlines() or [f"reading {name} ended with status {done.returncode}"]
             raise UserError(said[-1])
-        return read(path)
+        return read_views(path)

@@ -31,7 +31,7 @@ def solve_captured(cell: Cell, files: Sequence[Path], scene: Scene, wanted: Reco
     """
     with TemporaryDirectory(prefix="matbench-") as folder, without_main(), kernel_cache_in_use():
         views, heard = Path(folder) / "views.npz", Path(folder) / "told.npz"
-        views_only.write(scene, views)
+        views_only.write_views(scene, views)
         processes.start_server([__name__])
         line, theirs = Pipe(duplex=False)
         process = get_context("forkserver").Process(target=_solve, args=(theirs, cell, files, views, heard, wanted))
@@ -44,7 +44,7 @@ def solve_captured(cell: Cell, files: Sequence[Path], scene: Scene, wanted: Reco
         process.join()
         if said:
             raise UserError(f"{cell} {said}")
-        return told.read(heard)
+        return told.read_told(heard)
 
 
 def _solve(line: Connection, cell: Cell, files: Sequence[Path], views: Path, heard: Path, wanted: RecordOption) -> None:
@@ -52,7 +52,7 @@ def _solve(line: Connection, cell: Cell, files: Sequence[Path], views: Path, hea
     os.environ[views_only.VARIABLE] = "1"
     said = ""
     try:
-        scene, threads = views_only.read(views), limits.cores()
+        scene, threads = views_only.read_views(views), limits.cores()
         processes.use_threads(threads)
         method = plugins.algorithm(cell.method.algorithm, files).make(cell.method.params)
         if reason := unsupported(method, scene):
@@ -60,7 +60,7 @@ def _solve(line: Connection, cell: Cell, files: Sequence[Path], views: Path, hea
         else:
             probe = CapturingProbe(wanted.at(scene.height))
             estimate = method.solve(scene, Context(cell.seed, threads, probe))
-            told.write(heard, told.Told(probe, Estimate(checked(estimate, scene), estimate.volume)))
+            told.write_told(heard, told.Told(probe, Estimate(checked(estimate, scene), estimate.volume)))
     except BaseException as error:  # whatever a method raises
         said = f"failed: {failure(error)}"
     line.send_bytes(said.encode("utf-8", "replace"))

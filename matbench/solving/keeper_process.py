@@ -124,7 +124,7 @@ class Keeping:
             scene = load_scene(name, data, files)
             if scene.digest != wanted[1]:
                 raise UserError(f"{name} is not what it was when the run was planned")
-            views_only.write(scene, views)
+            views_only.write_views(scene, views)
 
         try:
             said = self._errand(read, end)
@@ -226,7 +226,7 @@ class Keeping:
                 return outcome
             if not intake.take(self.answer / MAPS, draft / MAPS):
                 raise ValueError("it has left no maps")
-            scene = views_only.read(self.views)
+            scene = views_only.read_views(self.views)
             maps = intake.maps(draft / MAPS, scene)
             intake.take(self.answer / VOLUME, draft / VOLUME)
             outcome = _timed(evolve(outcome, maps=maps_digest(maps)), count, job.threads)
@@ -251,7 +251,7 @@ class Keeping:
             from matbench.scenes.catalogue import load_scene
 
             scene = load_scene(name, data, files)
-            rrd.record_told(draft / "recording.rrd", scene, told.read(heard), title=str(job.cell))
+            rrd.record_told(draft / "recording.rrd", scene, told.read_told(heard), title=str(job.cell))
 
         said = self._errand(record, end)
         heard.unlink()

@@ -227,7 +227,7 @@ def _listen(method: Algorithm, scene: Scene, job: Job, path: Path) -> str:
         probe = CapturingProbe(job.settings.record.at(scene.height))
         estimate = method.solve(scene, Context(job.cell.seed, job.threads, probe))
         plain = Estimate(checked(estimate, scene), estimate.volume)  # the harness's own types only
-        told.write(path, told.Told(probe, plain))
+        told.write_told(path, told.Told(probe, plain))
     except Exception as error:
         traceback.print_exc()
         return f"not recorded: {failure(error)}"
@@ -244,7 +244,7 @@ def run_cell(order: Order, keeper: KeeperLine) -> Outcome:
         # files may have been edited since the plan was made: results must not stand under the old digest
         if plugins.method_digest(plugin, method) != cell.method.code:
             raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
-        scene = views_only.read(order.views)
+        scene = views_only.read_views(order.views)
         answer = _solve(method, scene, job, keeper)
         # `evolve` makes a scene whose digest is not cached: it is computed from the pixels as they are now
         if evolve(scene).digest != cell.scene_digest:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scene_files import pfm_bytes, write_png
 
 from matbench import load_scene
-from matbench.datasets.scaffold import natural, write
+from matbench.datasets.scaffold import natural, write_scene_toml
 from matbench.errors import UserError
 from matbench.scene import Range, Scene
 
@@ -39,7 +39,7 @@ def test_any_names_can_be_sorted(names: list[str]) -> None:
 
 
 def test_the_scene_of_a_folder_of_images(folder: Path, scene: Scene) -> None:
-    draft = write(folder)
+    draft = write_scene_toml(folder)
     found = load_scene(str(folder))
     assert found.labels == ("8", "9", "10", "11", "12")
     np.testing.assert_array_equal(found.views, scene.views)
@@ -50,16 +50,16 @@ def test_the_scene_of_a_folder_of_images(folder: Path, scene: Scene) -> None:
 
 
 def test_a_given_range_is_kept(folder: Path) -> None:
-    write(folder, (-1.5, 24))
+    write_scene_toml(folder, (-1.5, 24))
     assert load_scene(str(folder)).disparities == Range(-1.5, 24)
     with pytest.raises(UserError, match="empty"):
-        write(folder, (5, 1), replace=True)
+        write_scene_toml(folder, (5, 1), replace=True)
 
 
 def test_views_are_listed_as_they_were_taken(tmp_path: Path, scene: Scene) -> None:
     for name, view in zip("ebadc", scene.views, strict=True):
         write_png(tmp_path / f"{name}.png", view)
-    draft = write(tmp_path)
+    draft = write_scene_toml(tmp_path)
     np.testing.assert_array_equal(load_scene(str(tmp_path)).views, scene.views)
     assert any("not by their names" in remark for remark in draft.remarks)
 
@@ -67,7 +67,7 @@ def test_views_are_listed_as_they_were_taken(tmp_path: Path, scene: Scene) -> No
 def test_a_pair_named_the_wrong_way_round_is_put_right(tmp_path: Path, scene: Scene) -> None:
     write_png(tmp_path / "1.png", scene.views[3])
     write_png(tmp_path / "2.png", scene.views[2])
-    write(tmp_path)
+    write_scene_toml(tmp_path)
     np.testing.assert_array_equal(load_scene(str(tmp_path)).views, scene.views[2:4])
 
 
@@ -79,7 +79,7 @@ def test_truth_files_are_no_views_and_are_offered(folder: Path, scene: Scene) ->
     write_png(folder / "thumbnail.png", scene.views[0][::4, ::4])
     (folder / "broken.png").write_bytes(b"nothing")
     (folder / "notes.txt").write_text("hello")
-    draft = write(folder)
+    draft = write_scene_toml(folder)
     found = load_scene(str(folder))
     assert found.n == 5
     np.testing.assert_array_equal(found.truth[2], truth)
@@ -95,20 +95,20 @@ def test_truth_files_are_no_views_and_are_offered(folder: Path, scene: Scene) ->
 def test_nothing_is_overwritten_unasked(folder: Path) -> None:
     (folder / "scene.toml").write_text("mine")
     with pytest.raises(UserError, match=r"a scene already: it holds scene\.toml; --force"):
-        write(folder)
+        write_scene_toml(folder)
     assert (folder / "scene.toml").read_text() == "mine"
-    write(folder, replace=True)
+    write_scene_toml(folder, replace=True)
     assert load_scene(str(folder)).n == 5
     (folder / "scene.toml").unlink()
     (folder / "calib.txt").write_text("ndisp=20")
     with pytest.raises(UserError, match=r"calib\.txt"):
-        write(folder)
+        write_scene_toml(folder)
 
 
 def test_without_features_the_range_is_called_a_guess(tmp_path: Path) -> None:
     for name in ("a", "b"):
         write_png(tmp_path / f"{name}.png", np.full((60, 80, 3), 99, np.uint8))
-    draft = write(tmp_path)
+    draft = write_scene_toml(tmp_path)
     assert any("A GUESS" in remark for remark in draft.remarks)
     assert "A GUESS" in draft.path.read_text()
     assert load_scene(str(tmp_path)).n == 2
@@ -117,7 +117,7 @@ def test_without_features_the_range_is_called_a_guess(tmp_path: Path) -> None:
 def test_masks_among_views_are_left_out(folder: Path, scene: Scene) -> None:
     for number, region in enumerate(("occ", "disc")):
         write_png(folder / f"segment{number}.png", np.where(scene.regions[region], 255, 0).astype(np.uint8))
-    draft = write(folder)
+    draft = write_scene_toml(folder)
     assert tomllib.loads(draft.path.read_text())["views"] == [f"im{number}.png" for number in NUMBERS]
     assert sum("segment" in remark and "a mask" in remark for remark in draft.remarks) == 2
     assert "measured" in draft.remarks[-1]
@@ -127,7 +127,7 @@ def test_one_view_among_masks_is_too_few(tmp_path: Path, scene: Scene) -> None:
     write_png(tmp_path / "a.png", scene.views[0])
     write_png(tmp_path / "b.png", np.where(scene.regions["occ"], 255, 0).astype(np.uint8))
     with pytest.raises(UserError, match=r"at least two views .* found: a\.png"):
-        write(tmp_path)
+        write_scene_toml(tmp_path)
     assert not (tmp_path / "scene.toml").exists()
 
 
@@ -135,19 +135,21 @@ def test_random_dots_of_two_colours_are_views(tmp_path: Path) -> None:
     dots = np.random.default_rng(0).integers(0, 2, (60, 80, 1), np.uint8).repeat(3, 2) * 255
     for number in range(2):
         write_png(tmp_path / f"im{number}.png", np.roll(dots, -3 * number, axis=1))
-    assert tomllib.loads(write(tmp_path).path.read_text())["views"] == ["im0.png", "im1.png"]
+    assert tomllib.loads(write_scene_toml(tmp_path).path.read_text())["views"] == ["im0.png", "im1.png"]
 
 
 def test_a_picture_of_something_else_is_named(folder: Path, scene: Scene) -> None:
     other = load_scene(f"synthetic/fence[n=2 seed=7 size={scene.width}x{scene.height}]").views[0]
     write_png(folder / "zebra.png", other)
-    assert any("match in zebra.png: are these views of this scene?" in remark for remark in write(folder).remarks)
+    assert any(
+        "match in zebra.png: are these views of this scene?" in remark for remark in write_scene_toml(folder).remarks
+    )
 
 
 def test_names_that_need_quoting(tmp_path: Path, scene: Scene) -> None:
     for view, name in enumerate(['q"uote 1.png', "back\\slash 2.png", "déjà\tvu 3.png"]):
         write_png(tmp_path / name, scene.views[view])
-    write(tmp_path)
+    write_scene_toml(tmp_path)
     assert load_scene(str(tmp_path)).n == 3
 
 
@@ -157,7 +159,7 @@ def test_too_few_images_are_refused(tmp_path: Path, scene: Scene, names: list[st
         write_png(tmp_path / name, scene.views[0])
     (tmp_path / "photo.JPG").write_bytes(b"")
     with pytest.raises(UserError, match=r"too few images.*\.JPG are not read: save them as PNG"):
-        write(tmp_path)
+        write_scene_toml(tmp_path)
     assert not (tmp_path / "scene.toml").exists()
     with pytest.raises(UserError, match="does not exist"):
-        write(tmp_path / "none")
+        write_scene_toml(tmp_path / "none")

@@ -40,8 +40,8 @@ def heard() -> told.Told:
 
 
 def test_what_is_written_is_read_back(heard: told.Told, tmp_path: Path) -> None:
-    told.write(tmp_path / "told.npz", heard)
-    again = told.read(tmp_path / "told.npz")
+    told.write_told(tmp_path / "told.npz", heard)
+    again = told.read_told(tmp_path / "told.npz")
     assert same(again, heard)
     assert len(again.probe.frames) == len(heard.probe.frames) > 1
     assert same(again.probe.frames, heard.probe.frames)
@@ -51,11 +51,11 @@ def test_anything_else_is_refused(heard: told.Told, tmp_path: Path) -> None:
     path = tmp_path / "told.npz"
     path.write_bytes(b"no archive")
     with pytest.raises(ValueError, match="cannot be read"):
-        told.read(path)
+        told.read_told(path)
     facts: dict[str, Any] = {"probe": {}, "estimate": {"disparity": {"0": "array_7"}}}
     np.savez(path, facts=np.array(json.dumps(facts)))
     with pytest.raises(ValueError, match="cannot be read"):
-        told.read(path)
+        told.read_told(path)
     np.savez(path, facts=np.array([{"an": "object"}], object))  # numpy would have to unpickle it
     with pytest.raises(ValueError, match="cannot be read"):
-        told.read(path)
+        told.read_told(path)

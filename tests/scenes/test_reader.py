@@ -13,7 +13,7 @@ from matbench.scenes.reader import main
 
 def test_views_are_written(tmp_path: Path) -> None:
     main(str(tmp_path / "views.npz"), SMALL)
-    read = views_only.read(tmp_path / "views.npz")
+    read = views_only.read_views(tmp_path / "views.npz")
     assert read.digest == views_only.without_truth(load_scene(SMALL)).digest
     assert not read.truth
 
@@ -24,7 +24,7 @@ def test_scenes_of_a_persons_own_files_are_found(tmp_path: Path) -> None:
         main(str(tmp_path / "views.npz"), "walls/near")
     assert not (tmp_path / "views.npz").exists()
     main(str(tmp_path / "views.npz"), "walls/near", "", str(tmp_path / "walls.py"))
-    assert views_only.read(tmp_path / "views.npz").name == "walls/near"
+    assert views_only.read_views(tmp_path / "views.npz").name == "walls/near"
 
 
 def test_a_folder_that_is_missing_is_one_line(tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ def test_what_is_written_is_read_back_without_truth(tmp_path: Path) -> None:
     scene = load_scene("synthetic/spheres[size=96x72 predict=right]")
     assert scene.truth
     assert scene.held_out is not None
-    views_only.write(scene, tmp_path / "views.npz")
-    seen = views_only.read(tmp_path / "views.npz")
+    views_only.write_views(scene, tmp_path / "views.npz")
+    seen = views_only.read_views(tmp_path / "views.npz")
     assert seen.digest == scene.digest
     assert (seen.name, seen.labels, seen.pair_steps) == (scene.name, scene.labels, scene.pair_steps)
     assert not seen.truth
