@@ -74,7 +74,7 @@ def better_half(rho, low, high, hidden, cost):  # type: ignore[no-untyped-def]
 
 
 @helper
-def _sight(found, k, through, ended, reached):  # type: ignore[no-untyped-def]
+def sight(found, k, through, ended, reached):  # type: ignore[no-untyped-def]
     """through = V, reached += V and ended += w at plane k, for rays that end in the planes d = `found`.
 
     V = k + 2 - d and w = 1 - |k - d|, both kept within 0 and 1.
@@ -130,7 +130,7 @@ def weigh_seen(rho, pairs, maps, view, spans, y0, fineness, hidden, cost, materi
                 if j != view and count > 0:
                     # a map has one value a pixel: between two pixels the nearer one is asked
                     start = spans[j, k, 5] + (1 if 2 * spans[j, k, 4] > fineness else 0)
-                    _sight(
+                    sight(
                         maps[j, y0 + y, start : start + count],
                         k,
                         through[j, low : low + count],
@@ -147,30 +147,37 @@ def weigh_seen(rho, pairs, maps, view, spans, y0, fineness, hidden, cost, materi
 
 
 @helper
-def _weights(image, y, x, radius, fall, weight):  # type: ignore[no-untyped-def]
-    """fall[largest difference over the colours] of the pixels around one, summing to 1; 0 beyond the image."""
+def _shares(image, y, radius, fall, share):  # type: ignore[no-untyped-def]
+    """share (window rows, window columns, W) = fall[largest difference over the colours] of the pixels around each.
+
+    They sum to 1; beyond the image they are 0.
+    """
     height, width, _ = image.shape
-    total = np.float32(0)
+    total = np.zeros(width, np.float32)
     for dy in range(-radius, radius + 1):
         for dx in range(-radius, radius + 1):
-            share = np.float32(0)
-            if 0 <= y + dy < height and 0 <= x + dx < width:
+            row = share[dy + radius, dx + radius]
+            fill(np.float32(0), row)
+            if not 0 <= y + dy < height:
+                continue
+            for x in range(max(0, -dx), min(width, width - dx)):
                 gap = np.int64(0)
                 for c in range(3):
                     gap = max(gap, abs(np.int64(image[y + dy, x + dx, c]) - np.int64(image[y, x, c])))
-                share = fall[gap]
-            weight[dy + radius, dx + radius] = share
-            total += share
-    for dy in range(weight.shape[0]):
-        for dx in range(weight.shape[1]):
-            weight[dy, dx] /= total
+                row[x] = fall[gap]
+                total[x] += row[x]
+    for dy in range(share.shape[0]):
+        for dx in range(share.shape[1]):
+            row = share[dy, dx]
+            for x in range(width):
+                row[x] /= total[x]
 
 
 @helper
 def _add_share(part, share, total):  # type: ignore[no-untyped-def]
     """total += share * part."""
-    for k in range(total.size):
-        total[k] += share * part[k]
+    for x in range(total.size):
+        total[x] += share[x] * part[x]
 
 
 @kernel
@@ -180,7 +187,7 @@ def support(cost, image, first, skipped, fall, radius, out):  # type: ignore[no-
     Parameters
     ----------
     cost
-        (rows, width, planes): `skipped` rows of the image before those of `out`, and as many after
+        (rows, planes, width): `skipped` rows of the image before those of `out`, and as many after
         as its window or the image has.
     first
         Row of the image that is the first of `out`.
@@ -189,19 +196,24 @@ def support(cost, image, first, skipped, fall, radius, out):  # type: ignore[no-
     fall
         (256,) weight by the largest difference over the colours.
     out
-        (rows, width, planes), overwritten.
+        (rows, planes, width), overwritten.
     """
-    weight = np.empty((2 * radius + 1, 2 * radius + 1), np.float32)
+    height, width, _ = image.shape
+    share = np.empty((2 * radius + 1, 2 * radius + 1, width), np.float32)
     for row in range(out.shape[0]):
-        for x in range(out.shape[1]):
-            _weights(image, first + row, x, radius, fall, weight)
-            total = out[row, x]
+        _shares(image, first + row, radius, fall, share)
+        for k in range(out.shape[1]):
+            total = out[row, k]
             fill(np.float32(0), total)
             for dy in range(-radius, radius + 1):
+                if not 0 <= first + row + dy < height:
+                    continue
+                part = cost[row + skipped + dy, k]
                 for dx in range(-radius, radius + 1):
-                    share = weight[dy + radius, dx + radius]
-                    if share > 0:
-                        _add_share(cost[row + skipped + dy, x + dx], share, total)
+                    left, right = max(0, -dx), max(0, min(width, width - dx))
+                    if left < right:
+                        weight = share[dy + radius, dx + radius]
+                        _add_share(part[left + dx : right + dx], weight[left:right], total[left:right])
 
 
 @frozen
@@ -222,7 +234,7 @@ class Fusion:
     hidden: float = field(default=0.72, validator=validators.ge(0))
 
     def first_cost(self, matcher: Matcher, threads: int = 1, phases: Features | None = None) -> NDArray[np.float32]:
-        """(H, W, planes) 1 - mean of the better half of rho on the reference view's pixel rays."""
+        """(H, planes, W) 1 - mean of the better half of rho on the reference view's pixel rays."""
         spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
         low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
 
@@ -251,16 +263,15 @@ class Fusion:
 
         Returns
         -------
-        Two (H, W, planes) float32 arrays: the cost and mu.
+        Two (H, planes, W) float32 arrays: the cost and mu.
         """
         space, view = matcher.space, matcher.scene.ref
         spans = np.stack([matcher.ray_spans(view, j) for j in range(space.views)])
-        material = np.empty((space.rows, space.width, space.planes), np.float32)
+        material = np.empty((space.rows, space.planes, space.width), np.float32)
 
         def combine(rho: NDArray[np.uint8], top: int, cost: NDArray[np.float32]) -> None:
-            part = np.empty_like(cost)
+            part = material[top : top + len(cost)]
             weigh_seen(rho, matcher.pairs, maps, view, spans, top, space.fineness, np.float32(self.hidden), cost, part)
-            material[top : top + len(part)] = part.transpose(0, 2, 1)
 
         return self._cost(matcher, threads, phases, combine), material
 
@@ -279,17 +290,14 @@ class Fusion:
         features = matcher.phases() if phases is None else phases
         radius = matcher.settings.window // 2 if self.adaptive else 0
         fall = np.exp(np.arange(256) / -(self.adaptive or np.inf)).astype(np.float32)
-        cost = np.empty((space.rows, space.width, space.planes), np.float32)
+        cost = np.empty((space.rows, space.planes, space.width), np.float32)
 
         def fill_rows(first: int, end: int) -> None:
             top, bottom = max(0, first - radius), min(space.rows, end + radius)
-            part = np.empty((bottom - top, space.planes, space.width), np.float32)
+            part = np.empty((bottom - top, *cost.shape[1:]), np.float32) if radius else cost[first:end]
             combine(matcher.rays(features, top, bottom, 1 if self.adaptive else None), top, part)
-            turned = part.transpose(0, 2, 1)
             if radius:
-                support(np.ascontiguousarray(turned), image, first, first - top, fall, radius, cost[first:end])
-            else:
-                cost[first:end] = turned
+                support(part, image, first, first - top, fall, radius, cost[first:end])
 
         over_rows(fill_rows, space.rows, threads)
         return cost

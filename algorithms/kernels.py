@@ -2,6 +2,11 @@
 
 from typing import Any
 
+# first: it says what is wrong with numba's settings, and lets kernels that are defined from here on do without a cache
+from matbench.plans import kernel_cache  # noqa: F401
+
+# isort: split
+import numba
 from numba import njit
 from numba.extending import intrinsic
 
@@ -49,3 +54,8 @@ def _popcount(_: Any, word: Any) -> Any:
 
 # how many bits of a word are set: the processor's own instruction where it has one
 popcount: Any = intrinsic(_popcount)
+_config: Any = numba.config
+if _config.DISABLE_JIT:  # kernels are plain Python then
+
+    def popcount(word: Any) -> int:
+        return int(word).bit_count()

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+import numpy as np
 from attrs import field, frozen
 
 from matbench.algorithm import Context, Estimate
@@ -33,10 +34,12 @@ class MultiviewSGM:
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """The reference view's map, with an answer everywhere."""
-        matcher = Matcher.of(scene, self.matching)
-        maps = self.inference.initial_maps(matcher, context.threads)
+        matcher = Matcher.of(scene, self.matching, context.threads)
+        sure = np.empty((scene.height, scene.width), np.float32)
+        maps = self.inference.initial_maps(matcher, context.threads, sure)
         return Estimate(
             disparity={scene.ref: matcher.disparity(maps[matcher.scene.ref])},
+            confidence={scene.ref: sure},
             work={
                 "pair_similarities": self.inference.comparisons(matcher),
                 "volume_bytes": self.inference.volume_bytes(matcher, refined=False),

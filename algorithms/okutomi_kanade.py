@@ -7,15 +7,15 @@ from matbench.algorithm import Context, Estimate
 from matbench.algorithms.kernels import add, helper, kernel, literal
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
-from matbench.algorithms.sampling import by_phase, fine_rows, search_space
+from matbench.algorithms.sampling import OnGrid, by_phase, fine_rows, grid, off_grid, search_space
 from matbench.algorithms.windows import square_difference
-from matbench.scene import Scene
+from matbench.scene import Scene, SceneError
 
 BLOCK_ROWS = 32  # rows that one task works on: its arrays stay in the second-level cache
 
 
 @frozen
-class OkutomiKanade:
+class OkutomiKanade(OnGrid):
     """For each pixel of the reference view the disparity that minimises the SSSD.
 
     SSSD(x, d) = mean over views j != ref of
@@ -44,7 +44,10 @@ class OkutomiKanade:
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """Disparities of the reference view; NaN only where no other view holds the window in any plane."""
         kept = scene.widest(self.views or scene.n)
-        chosen = scene.choose(kept)
+        laid = grid(scene.choose(kept))
+        if laid is None:
+            raise SceneError(f"{scene.name}: {off_grid(scene.choose(kept))}")
+        chosen, places = laid[0], np.array(laid[1])
         space = search_space(chosen, self.fineness)
         radius = self.window // 2
 
@@ -55,12 +58,12 @@ class OkutomiKanade:
             top, bottom = max(0, first - radius), min(space.rows, end + radius)
             phases = by_phase(fine_rows(chosen.views[:, top:bottom], space.fineness), space.fineness)
             disparity[first:end], count = sssd_minimum(
-                phases, chosen.ref, space.first, space.planes, radius, first - top, end - first
+                phases, chosen.ref, places, space.first, space.planes, radius, first - top, end - first
             )
-            evaluations.append(count)
+            evaluations.append(int(count))
 
         over_rows(solve_rows, space.rows, context.threads, BLOCK_ROWS)
-        disparity /= np.float32(space.fineness * (kept[1] - kept[0]))
+        disparity /= np.float32(space.fineness * scene.pair_steps / chosen.pair_steps)
         return Estimate({scene.ref: disparity}, work={"ssd_evaluations": sum(evaluations)})
 
 
@@ -96,7 +99,7 @@ def _refine(place, best, before, after, first, out):  # type: ignore[no-untyped-
 
 
 @kernel
-def sssd_minimum(phases, ref, first, planes, radius, top, rows):  # type: ignore[no-untyped-def]
+def sssd_minimum(phases, ref, places, first, planes, radius, top, rows):  # type: ignore[no-untyped-def]
     """Plane of the smallest SSSD for a block of rows, refined by a parabola.
 
     Parameters
@@ -105,6 +108,8 @@ def sssd_minimum(phases, ref, first, planes, radius, top, rows):  # type: ignore
         (n, q, 3, R, W) float32, see `by_phase`: the block's rows and those its windows reach.
     ref
         Index of the reference view.
+    places
+        (n,) where each view lies, in view steps.
     first, planes
         Number of the farthest plane (disparity ``first / q``) and how many planes there are.
     radius
@@ -135,7 +140,7 @@ def sssd_minimum(phases, ref, first, planes, radius, top, rows):  # type: ignore
         terms[:] = 0
         for view in range(views):
             # sample q * (x + whole) + phase of this view is the homologue of pixel x
-            shift = (ref - view) * (first + plane)
+            shift = (places[ref] - places[view]) * (first + plane)
             whole, phase = shift // fineness, shift % fineness
             seen = max(0, -whole)
             end = min(width, width - whole - (1 if phase else 0))

@@ -5,8 +5,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 
 def share(rows: int, threads: int) -> int:
-    """Rows per call, if a call costs as much as some rows: eight calls per thread still balance the load."""
-    return max(1, -(-rows // (8 * max(1, threads))))
+    """Rows per call, if a call costs as much as some rows: all for one thread; else eight calls per thread."""
+    # eight are enough to balance the load, and one thread has none to balance
+    return max(1, rows if threads <= 1 else -(-rows // (8 * threads)))
 
 
 def over_rows(work: Callable[[int, int], None], rows: int, threads: int, block: int = 16) -> None:

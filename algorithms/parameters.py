@@ -1,6 +1,18 @@
-"""Validators that several methods' parameters share; each raises a ValueError that says what is possible."""
+"""What several methods' parameters share: validators, whose ValueError says what is possible, and which are read."""
 
+from collections.abc import Mapping
 from typing import Any
+
+
+def unread(takes: Mapping[str, tuple[bool, str]]) -> dict[str, str]:
+    """Parameter -> what it needs to have an effect, for those that are not read.
+
+    Parameters
+    ----------
+    takes
+        Parameter -> is it read, beside the values of the others? And what it takes to be read.
+    """
+    return {name: condition for name, (is_read, condition) in takes.items() if not is_read}
 
 
 def odd(_: object, attribute: Any, value: int) -> None:

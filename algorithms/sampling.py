@@ -3,12 +3,14 @@
 See docs/concepts/disparity-space.md.
 """
 
-from math import ceil
+from fractions import Fraction
+from math import ceil, lcm
 
 import numpy as np
+from attrs import evolve
 from numpy.typing import NDArray
 
-from matbench.scene import Scene
+from matbench.scene import SAME_PLACE, Scene
 from matbench.space import DisparitySpace
 
 
@@ -70,6 +72,62 @@ def by_phase(values: NDArray[np.generic], fineness: int) -> NDArray[np.generic]:
         part = values[..., phase::fineness]
         out[:, phase, ..., : part.shape[-1]] = part
     return out
+
+
+MOST_PARTS = 8
+"""Of a view step: a finer grid takes as many more samples of each row."""
+
+
+def grid(scene: Scene) -> tuple[Scene, tuple[int, ...]] | None:
+    """The scene per step of a grid on which all of its views lie, and each view's place; None if there is no such grid.
+
+    What has a disparity of d pixels per view step has d / m per step of the grid, m steps of which are a view step.
+
+    >>> import numpy as np
+    >>> from matbench import Range, Scene
+    >>> views = np.zeros((3, 2, 2, 3), np.uint8)
+    >>> scene = Scene("three", views, ("0", "1", "2"), 0, Range(0, 4), {}, 1, positions=(0, 1, 2.5))
+    >>> per_step, places = grid(scene)
+    >>> places, per_step.disparities, per_step.pair_steps
+    ((0, 2, 5), Range(least=0.0, largest=2.0), 2)
+    """
+    parts = [Fraction(position).limit_denominator(MOST_PARTS) for position in scene.places]
+    if any(abs(float(part) - position) > SAME_PLACE for part, position in zip(parts, scene.places, strict=True)):
+        return None
+    m = lcm(*(part.denominator for part in parts))
+    if m > MOST_PARTS:
+        return None
+    scaled = evolve(
+        scene,
+        disparities=scene.disparities.scaled(1 / m),
+        pair_steps=scene.pair_steps * m,
+        positions=tuple(position * m for position in scene.places),
+        truth={},
+        regions={},
+        visible={},
+        held_out=None,
+    )
+    return (scaled if m > 1 else scene), tuple(int(part * m) for part in parts)
+
+
+def off_grid(scene: Scene) -> str | None:
+    """Why a scene has no `grid`, in words; None if it has one."""
+    if grid(scene) is not None:
+        return None
+    return f"it samples views on a grid, and these, at {scene.where}, lie on none of up to {MOST_PARTS} parts of a step"
+
+
+class OnGrid:
+    """What methods say that sample views on a `grid`: their steps may be uneven."""
+
+    @property
+    def uneven(self) -> bool:
+        """Costs that are shared with materiality come from a space whose views lie at even steps."""
+        return getattr(getattr(self, "costs", self), "similarity", "published") == "published"
+
+    def unsupported_reason(self, scene: Scene) -> str | None:
+        """Why a scene cannot be sampled, in words."""
+        return off_grid(scene)
 
 
 def search_space(scene: Scene, fineness: int = 0) -> DisparitySpace:

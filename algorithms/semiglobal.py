@@ -1,41 +1,14 @@
 """Semi-global matching (Hirschmueller 2008): costs aggregated along eight paths, the winner and its sub-pixel fit."""
 
-from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
-from matbench.algorithms.kernels import helper, kernel
-
-
-@helper
-def _least(values):  # type: ignore[no-untyped-def]
-    """The least of some numbers, none NaN."""
-    # four minima at once: in a single chain every step would wait for the one before
-    a = b = c = d = values[0]
-    whole = values.size - values.size % 4
-    for k in range(0, whole, 4):
-        a, b = min(a, values[k]), min(b, values[k + 1])
-        c, d = min(c, values[k + 2]), min(d, values[k + 3])
-    for k in range(whole, values.size):
-        a = min(a, values[k])
-    return min(min(a, b), min(c, d))
-
-
-@helper
-def _extend(cost, below, before, above, floor, small, large, path, total):  # type: ignore[no-untyped-def]
-    """L(p, k) = C(p, k) + min(L(q, k), L(q, k +- 1) + P1, min L(q) + P2) - min L(q), added to the total.
-
-    `below`, `before`, `above` are L(q, .) at k - 1, k, k + 1. An unknown (NaN) cost adds nothing.
-    """
-    zero = np.float32(0)
-    cap = floor + large
-    for k in range(cost.size):
-        known = cost[k] if cost[k] == cost[k] else zero
-        move = min(min(below[k], above[k]) + small, min(before[k], cap)) - floor
-        path[k] = known + move
-        total[k] += path[k]
+from matbench.algorithms.kernels import fill, helper, kernel
+from matbench.algorithms.parallel import over_rows
+from matbench.algorithms.peak_ratio import peak_ratio
 
 
 @helper
@@ -47,48 +20,125 @@ def _contrast(a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _sweep(cost, image, small, large, forward, total):  # type: ignore[no-untyped-def]
-    """Four of the eight paths: from the previous pixel of the row and the three in the previous row.
+def _whole(cost, scale, out):  # type: ignore[no-untyped-def]
+    """out = cost in whole units; 0 where it is unknown (NaN)."""
+    zero, half, kind = np.float32(0), np.float32(0.5), out.dtype.type
+    for y in range(cost.shape[0]):
+        for k in range(cost.shape[1]):
+            values, row = cost[y, k], out[y, k]
+            for x in range(values.size):
+                row[x] = kind(values[x] * scale + half) if values[x] == values[x] else kind(zero)
 
-    Backward, the image is walked from its last pixel to its first.
+
+@helper
+def _step_up(above, small, move):  # type: ignore[no-untyped-def]
+    """move = L(q, k + 1) + P1: before the first plane there is none."""
+    kind = move.dtype.type
+    for x in range(move.size):
+        move[x] = kind(above[x] + small)
+
+
+@helper
+def _step(below, above, small, move):  # type: ignore[no-untyped-def]
+    """move = min L(q, k +- 1) + P1."""
+    kind = move.dtype.type
+    for x in range(move.size):
+        move[x] = kind(min(below[x], above[x]) + small)
+
+
+@helper
+def _extend(before, cap, floor, cost, move):  # type: ignore[no-untyped-def]
+    """move = C(p, k) + min(move, L(q, k), min L(q) + P2) - min L(q)."""
+    kind = move.dtype.type
+    for x in range(move.size):
+        move[x] = kind(kind(min(move[x], min(before[x], cap[x])) - floor[x]) + cost[x])
+
+
+@helper
+def _take(move, path, least, total):  # type: ignore[no-untyped-def]
+    """L(p, k) = move, and what it does to min L(p) and to the sum over the paths."""
+    kind = move.dtype.type
+    for x in range(move.size):
+        value = move[x]
+        path[x] = value
+        least[x] = min(least[x], value)
+        total[x] = kind(total[x] + value)
+
+
+@kernel
+def _sweep(cost, image, small, large, border, spread, forward, total):  # type: ignore[no-untyped-def]
+    """The paths from the row before to the next one, added to `total`: down the columns and, for `spread` = 1, aslant.
+
+    Backward, the rows are walked from the last to the first.
+
+    L(p, k) = C(p, k) + min(L(q, k), L(q, k +- 1) + P1, min L(q) + P2) - min L(q), in whole units.
+
+    Parameters
+    ----------
+    cost
+        (rows, planes, columns) of unsigned integers; rows and columns beyond the image are not read.
+    border
+        More than any L, and so much that `small` more is still a number of their kind.
     """
-    height, width, planes = cost.shape
-    border = np.float32(np.inf)
-    # path costs L of the previous and this row, and of the previous pixel, with borders around the planes
-    old = np.full((3, width, planes + 2), border, np.float32)
-    new = np.full((3, width, planes + 2), border, np.float32)
-    old_least = np.zeros((3, width), np.float32)
-    new_least = np.zeros((3, width), np.float32)
-    run = np.full((2, planes + 2), border, np.float32)
-    run_least = np.float32(0)
-    free = np.zeros(planes + 2, np.float32)
-    zero = np.float32(0)
-    ahead = 1 if forward else -1
-    for row in range(height):
-        y = row if forward else height - 1 - row
-        for place in range(width):
-            x = place if forward else width - 1 - place
-            here, out = cost[y, x], total[y, x]
-            path = run[place % 2]
-            if place == 0:
-                _extend(here, free[:-2], free[1:-1], free[2:], zero, small, zero, path[1:-1], out)
-            else:
-                last = run[(place + 1) % 2]
-                penalty = large[_contrast(image[y, x], image[y, x - ahead])]
-                _extend(here, last[:-2], last[1:-1], last[2:], run_least, small, penalty, path[1:-1], out)
-            run_least = _least(path[1:-1])
-            for d in range(3):
-                x_old, y_old = x - ahead * (d - 1), y - ahead
-                path = new[d, x]
-                if row == 0 or x_old < 0 or x_old >= width:
-                    _extend(here, free[:-2], free[1:-1], free[2:], zero, small, zero, path[1:-1], out)
+    # many short loops over the columns, each over few arrays: so each becomes instructions for many columns at once
+    (rows, columns, _), planes = image.shape, cost.shape[1]
+    count, kind = 2 * spread + 1, cost.dtype.type
+    # L of the row before and of this one, and min L: a column more on both sides, from where a path begins anew
+    paths = np.zeros((count, 2, planes + 1, columns + 2), cost.dtype)
+    paths[:, :, planes] = border
+    least = np.zeros((count, 2, columns + 2), cost.dtype)
+    cap, move = np.zeros((count, columns), cost.dtype), np.empty(columns, cost.dtype)
+    for row in range(rows):
+        y, y_old = (row, row - 1) if forward else (rows - 1 - row, rows - row)
+        old, new = row % 2, 1 - row % 2
+        for d in range(count):
+            for x in range(columns):
+                x_old = x + spread - d
+                begins = row == 0 or x_old < 0 or x_old >= columns
+                jump = kind(0) if begins else large[_contrast(image[y, x], image[y_old, x_old])]
+                cap[d, x] = kind(least[d, old, x_old + 1] + jump)
+            for x in range(columns):
+                least[d, new, x + 1] = border
+        for k in range(planes):
+            for d in range(count):
+                first = 1 + spread - d
+                end, before = first + columns, paths[d, old]
+                if k == 0:
+                    _step_up(before[k + 1, first:end], small, move)
                 else:
-                    last = old[d, x_old]
-                    penalty = large[_contrast(image[y, x], image[y_old, x_old])]
-                    _extend(here, last[:-2], last[1:-1], last[2:], old_least[d, x_old], small, penalty, path[1:-1], out)
-                new_least[d, x] = _least(path[1:-1])
-        old, new = new, old
-        old_least, new_least = new_least, old_least
+                    _step(before[k - 1, first:end], before[k + 1, first:end], small, move)
+                _extend(before[k, first:end], cap[d], least[d, old, first:end], cost[y, k, :columns], move)
+                _take(move, paths[d, new, k, 1:-1], least[d, new, 1:-1], total[y, k, :columns])
+
+
+_EACH, _BAND = 4, 128  # numbers in a word; rows that are turned together, so that lines of the cache are filled
+_EVEN, _FIRST = np.uint64(0x0000FFFF0000FFFF), np.uint64(0x00000000FFFFFFFF)
+_ONE, _TWO = np.uint64(16), np.uint64(32)
+
+
+@helper
+def _turn_rows(rows, out):  # type: ignore[no-untyped-def]
+    """Turns squares of four by four 16-bit numbers, of which four rows are four words."""
+    for y in range(rows.shape[0] // _EACH):
+        r0, r1, r2, r3 = rows[_EACH * y], rows[_EACH * y + 1], rows[_EACH * y + 2], rows[_EACH * y + 3]
+        for x in range(rows.shape[1]):
+            a, b, c, d = r0[x], r1[x], r2[x], r3[x]
+            top_even, top_odd = (a & _EVEN) | ((b & _EVEN) << _ONE), ((a >> _ONE) & _EVEN) | (b & ~_EVEN)
+            low_even, low_odd = (c & _EVEN) | ((d & _EVEN) << _ONE), ((c >> _ONE) & _EVEN) | (d & ~_EVEN)
+            out[_EACH * x, y] = (top_even & _FIRST) | (low_even << _TWO)
+            out[_EACH * x + 1, y] = (top_odd & _FIRST) | (low_odd << _TWO)
+            out[_EACH * x + 2, y] = (top_even >> _TWO) | (low_even & ~_FIRST)
+            out[_EACH * x + 3, y] = (top_odd >> _TWO) | (low_odd & ~_FIRST)
+
+
+@kernel
+def _turn(volume, first, end, out):  # type: ignore[no-untyped-def]
+    """Turns some planes of (rows, planes, columns) volumes of 16-bit numbers, given as words."""
+    rows = volume.shape[0]
+    for top in range(0, rows, _BAND):
+        bottom = min(rows, top + _BAND)
+        for k in range(first, end):
+            _turn_rows(volume[top:bottom, k], out[:, k, top // _EACH : bottom // _EACH])
 
 
 def penalties(small: float, large: float, edge: float) -> NDArray[np.float32]:
@@ -96,15 +146,64 @@ def penalties(small: float, large: float, edge: float) -> NDArray[np.float32]:
     return np.maximum(small, large * np.exp(-np.arange(256) / edge)).astype(np.float32)
 
 
+COARSEST = 1000
+"""Units that the largest cost is worth at least, as far as numbers allow it."""
+
+
+def _units(top: float, table: NDArray[np.float32]) -> tuple[type[np.uint16 | np.uint32], float]:
+    """The smallest kind of whole numbers for sums over eight paths, and how many of them make a cost of 1.
+
+    A path costs at most the largest cost and the largest penalty, as min L(q) is subtracted at each step.
+    """
+    most = top + float(table.max())
+    # a little less than what fits, for what rounding adds; 23 bits are what a cost in single precision has
+    small, large = (((np.iinfo(kind).max >> 3) - 4) / most if most else 1.0 for kind in (np.uint16, np.uint32))
+    if most == 0 or small * top >= COARSEST:
+        return np.uint16, small
+    return np.uint32, min(large, (1 << 23) / top) if top else large
+
+
+def _turned(volume: NDArray[Any], threads: int) -> NDArray[Any]:
+    """(columns, planes, rows) the same volume of the turned picture; rows and columns are multiples of four."""
+    out = np.empty(volume.shape[::-1], volume.dtype)
+    if volume.itemsize == 2:
+        words, turned = volume.view(np.uint64), out.view(np.uint64)
+        over_rows(lambda first, end: _turn(words, first, end, turned), volume.shape[1], threads)
+    else:
+        np.copyto(out, volume.T)
+    return out
+
+
+def _add_paths(
+    cost: NDArray[Any],
+    image: NDArray[np.uint8],
+    steps: tuple[Any, Any, Any],
+    spread: int,
+    total: NDArray[Any],
+    threads: int,
+) -> None:
+    """Adds the paths forward and backward to `total`, each by a thread of its own if there are two."""
+    ways = {True: total, False: np.zeros_like(total)}
+
+    def sweep(first: int, _: int) -> None:
+        forward = first == 0
+        _sweep(cost, image, *steps, spread, forward, ways[forward])
+
+    over_rows(sweep, 2, threads, 1)
+    total += ways[False]
+
+
 def aggregate(
     cost: NDArray[np.float32], image: NDArray[np.uint8], small: float, large: float, edge: float, threads: int = 1
-) -> NDArray[np.float32]:
-    """Sum of the path costs over eight directions.
+) -> tuple[NDArray[np.uint16] | NDArray[np.uint32], float]:
+    """Sum of the path costs over eight directions, in whole units: many small numbers are added at once.
+
+    Paths along the rows are paths down the columns of the turned picture.
 
     Parameters
     ----------
     cost
-        (H, W, K) float32; NaN = unknown: it adds nothing to a path.
+        (H, planes, W) float32, at least 0; NaN = unknown: it adds nothing to a path.
     image
         (H, W, 3) uint8; across its edges large steps cost less.
     small, large
@@ -114,22 +213,33 @@ def aggregate(
 
     Returns
     -------
-    (H, W, K) float32, free of NaN. The same for any number of threads.
+    sums
+        (H, planes, W or up to three more) whole numbers. The same for any number of threads.
+    unit
+        How many of them make a cost of 1: 4095 for costs up to 1 and a P2 of 1.
     """
     table = penalties(small, large, edge)
-    totals = np.zeros((2, *cost.shape), np.float32)
+    kind, unit = _units(float(np.nanmax(cost, initial=0)), table)
+    border = np.iinfo(kind).max >> 1
+    steps = kind(round(small * unit)), np.rint(table.astype(float) * unit).astype(kind), kind(border)
+    rows, planes, columns = cost.shape
+    whole = np.zeros((-(-rows // _EACH) * _EACH, planes, -(-columns // _EACH) * _EACH), kind)
+    over_rows(lambda top, end: _whole(cost[top:end], np.float32(unit), whole[top:end]), rows, threads)
+    along = np.zeros(whole.shape[::-1], kind)
+    _add_paths(_turned(whole, threads), np.ascontiguousarray(image.transpose(1, 0, 2)), steps, 0, along, threads)
+    total = _turned(along, threads)
+    del along
+    _add_paths(whole, image, steps, 1, total, threads)
+    return total[:rows], unit
 
-    def sweep(forward: bool) -> None:
-        _sweep(cost, image, np.float32(small), table, forward, totals[0 if forward else 1])
 
-    if threads > 1:
-        with ThreadPoolExecutor(2) as pool:
-            list(pool.map(sweep, (True, False)))
-    else:
-        sweep(True)
-        sweep(False)
-    total: NDArray[np.float32] = np.add(totals[0], totals[1], out=totals[0])
-    return total
+@helper
+def _lesser(values, known, k, least, best):  # type: ignore[no-untyped-def]
+    for x in range(known.size):
+        value = np.float32(values[x])
+        better = known[x] == known[x] and value < least[x]
+        best[x] = np.float32(k) if better else best[x]
+        least[x] = value if better else least[x]
 
 
 @kernel
@@ -138,38 +248,41 @@ def winner(total, cost):  # type: ignore[no-untyped-def]
 
     A plane whose own cost is NaN cannot win; the answer is NaN where all costs are. With the totals S at the
     winner k and beside it, the fraction is ``(S[k-1] - S[k+1]) / (2 (max(S[k-1], S[k+1]) - S[k]))``. There is
-    no fraction at the ends of the range, beside an unknown plane, or if S is less beside k.
+    no fraction at the ends of the range, beside an unknown plane, or if S is less beside k. Both volumes are
+    (H, planes, W).
     """
-    height, width, planes = total.shape
-    found = np.empty((height, width), np.float32)
+    height, planes, width = cost.shape
+    found, least = np.empty((height, width), np.float32), np.empty(width, np.float32)
     for y in range(height):
+        sums, known, answers = total[y], cost[y], found[y]
+        fill(np.float32(np.nan), answers)
+        fill(np.float32(np.inf), least)
+        for k in range(planes):
+            _lesser(sums[k], known[k], k, least, answers)
         for x in range(width):
-            sums, known = total[y, x], cost[y, x]
-            best = -1
-            for k in range(planes):
-                if known[k] == known[k] and (best < 0 or sums[k] < sums[best]):
-                    best = k
-            found[y, x] = best if best >= 0 else np.nan
-            if 0 < best < planes - 1 and not np.isnan(known[best - 1]) and not np.isnan(known[best + 1]):
-                below, here, above = sums[best - 1], sums[best], sums[best + 1]
-                drop = max(below, above) - here
-                if drop > 0 and here <= min(below, above):
-                    found[y, x] += (below - above) / (drop + drop)
+            if not 0 < answers[x] < planes - 1:
+                continue
+            best = int(answers[x])
+            if not np.isnan(known[best - 1, x]) and not np.isnan(known[best + 1, x]):
+                below, above = np.float32(sums[best - 1, x]), np.float32(sums[best + 1, x])
+                drop = max(below, above) - least[x]
+                if drop > 0 and least[x] <= min(below, above):
+                    answers[x] += (below - above) / (drop + drop)
     return found
 
 
 @kernel
 def _energies(cost, image, planes, small, large):  # type: ignore[no-untyped-def]
     """(H,) sums of E over the pixels of each row: their own costs, and what they pay to four of their neighbours."""
-    height, width, _ = cost.shape
+    height, _, width = cost.shape
     found = np.zeros(height)
     for y in range(height):
         for x in range(width):
             k = planes[y, x]
             if k < 0:
                 continue
-            if cost[y, x, k] == cost[y, x, k]:
-                found[y] += cost[y, x, k]
+            if cost[y, k, x] == cost[y, k, x]:
+                found[y] += cost[y, k, x]
             for d in range(4):  # the pixel before, and the three of the row before: each pair of neighbours once
                 x_old, y_old = (x - 1, y) if d == 3 else (x + d - 1, y - 1)
                 if x_old < 0 or x_old >= width or y_old < 0 or planes[y_old, x_old] < 0:
@@ -206,7 +319,7 @@ class SemiGlobal:
         Parameters
         ----------
         cost
-            (H, W, K); NaN = unknown: such a plane is never the answer.
+            (H, planes, W); NaN = unknown: such a plane is never the answer.
         image
             (H, W, 3) uint8, the view whose rays the costs are on.
 
@@ -214,7 +327,15 @@ class SemiGlobal:
         -------
         (H, W) float32, NaN where all costs are.
         """
-        return np.asarray(winner(self.sums(cost, image, threads), cost))
+        return self.infer_surely(cost, image, threads, surely=False)[0]
+
+    def infer_surely(
+        self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1, surely: bool = True
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """The same, and (H, W) the `peak_ratio` of the sums of path costs, if it is asked for."""
+        sums, _ = aggregate(cost, image, self.small_step, self.large_step, self.contrast, threads)
+        found = np.asarray(winner(sums, cost))
+        return found, peak_ratio(sums, found, threads) if surely else None
 
     def energy(self, cost: NDArray[np.float32], image: NDArray[np.uint8], planes: NDArray[np.float32]) -> float:
         """The energy of a map per pixel (Hirschmueller 2008, equation 3); `infer` seeks the map of least energy.
@@ -232,7 +353,3 @@ class SemiGlobal:
         whole = np.nan_to_num(np.rint(planes), nan=-1).astype(np.int64)
         large = penalties(self.small_step, self.large_step, self.contrast)
         return float(_energies(cost, image, whole, np.float32(self.small_step), large).sum() / planes.size)
-
-    def sums(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
-        """(H, W, K) path costs, summed over the eight directions; see `aggregate`."""
-        return aggregate(cost, image, self.small_step, self.large_step, self.contrast, threads)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import ceil, floor
-from typing import Literal
+from typing import ClassVar, Literal
 
 import cv2
 import numpy as np
@@ -54,6 +54,8 @@ class SGBM:
         Fill holes from the farther side of their row?
     """
 
+    uneven: ClassVar[bool] = True
+
     block_size: int = field(default=3, validator=odd)
     mode: Literal["sgbm", "hh", "three_way"] = field(default="sgbm", validator=validators.in_(MODES))
     p1: int = field(default=8, validator=validators.gt(0))
@@ -77,7 +79,7 @@ class SGBM:
         """Disparities of the reference view."""
         partner = field_partner(scene)
         left, right = scene.views[scene.ref], scene.views[partner]
-        gap = abs(partner - scene.ref)
+        gap = abs(scene.steps(partner))
         mirrored = partner < scene.ref
         if mirrored:
             left, right = left[:, ::-1], right[:, ::-1]
@@ -137,6 +139,10 @@ def _tried(least: int, largest: int) -> int:
 
 def field_partner(scene: Scene) -> int:
     """Index of the view to match the reference view with; see `SGBM`."""
+    if not scene.is_even:
+        found = scene.at(scene.pair_steps), scene.at(-scene.pair_steps)
+        ends = scene.n - 1 if scene.steps(scene.n - 1) >= -scene.steps(0) else 0
+        return next((view for view in found if view is not None), ends)
     gap = max(1, round(scene.pair_steps))
     for partner in (scene.ref + gap, scene.ref - gap):
         if 0 <= partner < scene.n:

@@ -1,6 +1,7 @@
 """Similarities rho_ij of windows in pairs of views, at all target points (docs/concepts/methods.md)."""
 
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import combinations, pairwise
 from typing import Literal, get_args
 
@@ -8,13 +9,15 @@ import numpy as np
 from attrs import evolve, field, frozen, validators
 from numpy.typing import NDArray
 
+from matbench.algorithms import mccnn
 from matbench.algorithms.features import census, gradient, luma, same_surface
 from matbench.algorithms.parallel import over_rows
-from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
+from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel, unread
 from matbench.algorithms.sampling import by_phase, fine_rows, search_space
 from matbench.algorithms.windows import (
     CENSUS,
     EXPONENTIAL,
+    LEARNED,
     LINEAR,
     MIXED,
     ROOT,
@@ -28,7 +31,7 @@ from matbench.scene import Scene
 from matbench.space import DisparitySpace
 
 PairSet = Literal["all", "consecutive", "reference"]
-Form = Literal["ssd", "rms", "linear", "census", "mixed"]
+Form = Literal["ssd", "rms", "linear", "census", "mixed", "mccnn"]
 
 
 def pairs(views: int, which: PairSet, ref: int = 0) -> NDArray[np.int64]:
@@ -61,7 +64,9 @@ class Matching:
         of the pixels' 7x7 census differ, ``census``: rho = 1 - the mean over the two windows of
         min(h, 20) / 20. ``mixed``: rho = 1 - that of 0.35 |dI| / 20 + 0.25 min(|dg|, 10) / 10
         + 0.40 min(h, 20) / 20, |dI| being the mean absolute difference over the colours and dg that
-        of the horizontal gradients of the luma.
+        of the horizontal gradients of the luma. ``mccnn``: rho = f g, or 0 where that is less, with f and g
+        descriptors of 11x11 pixels by a trained network (`algorithms.mccnn`); it takes
+        ``pip install 'matbench-stereo[mccnn]'``.
     window
         Side of the square window in pixels, odd.
     sigma
@@ -80,7 +85,7 @@ class Matching:
     views: int = field(default=9, validator=all_or_several)
     fineness: int = field(default=0, validator=planes_a_pixel)
     pairs: PairSet = field(default="reference", validator=validators.in_(get_args(PairSet)))
-    similarity: Form = field(default="mixed", validator=validators.in_(get_args(Form)))
+    similarity: Form = field(default="mixed", validator=[validators.in_(get_args(Form)), mccnn.installed])
     window: int = field(default=3, validator=odd)
     sigma: float = field(default=9.0, validator=validators.gt(0))
     truncation: float = field(default=20.0, validator=validators.ge(0))
@@ -93,11 +98,14 @@ class Matching:
         form = self.similarity
         takes = {
             "sigma": (form in ("ssd", "rms"), "similarity=ssd or rms"),
-            "truncation": (form != "census", "another similarity than census"),
+            "truncation": (form not in ("census", "mccnn"), "another similarity than census and mccnn"),
             "alike": (form in ("census", "mixed"), "similarity=census or mixed"),
-            "colour": (form != "census" or self.alike > 0, "another similarity than census, or alike above 0"),
+            "colour": (
+                form != "mccnn" and (form != "census" or self.alike > 0),
+                "another similarity than mccnn and census, or census and alike above 0",
+            ),
         }
-        return {name: condition for name, (is_read, condition) in takes.items() if not is_read}
+        return unread(takes)
 
 
 @frozen(eq=False)
@@ -121,6 +129,8 @@ class Matcher:
     bits, masks
         (views, words, H, samples) census of the luma, and which of its pixels are likely on the same surface
         as the middle one; H is 0 if the similarity does not use them.
+    descriptors
+        (views, H, samples, 64) int8, as `mccnn.descriptors` gives them; H is 0 if the similarity does not use them.
     settings
         How windows are compared.
     """
@@ -133,10 +143,11 @@ class Matcher:
     slopes: NDArray[np.float32]
     bits: NDArray[np.uint16]
     masks: NDArray[np.uint16]
+    descriptors: NDArray[np.int8]
     settings: Matching
 
     @classmethod
-    def of(cls, scene: Scene, settings: Matching) -> "Matcher":
+    def of(cls, scene: Scene, settings: Matching, threads: int = 1) -> "Matcher":
         """Choose views and planes, and sample the rows."""
         indices = scene.widest(settings.views or scene.n)
         chosen = scene.choose(indices)
@@ -149,8 +160,13 @@ class Matcher:
             rows = grey[:, None]
         is_masked = bits.size and settings.alike
         masks = same_surface(rows if is_masked else rows[:, :, :0], space.fineness, settings.alike)
+        described = (
+            mccnn.descriptors(grey, space.fineness, threads)
+            if form == "mccnn"
+            else np.zeros((chosen.n, 0, 0, 0), np.int8)
+        )
         chosen_pairs = pairs(chosen.n, settings.pairs, chosen.ref)
-        return cls(chosen, indices, space, chosen_pairs, rows, slopes, bits, masks, settings)
+        return cls(chosen, indices, space, chosen_pairs, rows, slopes, bits, masks, described, settings)
 
     def with_reference(self, view: int) -> "Matcher":
         """The same views with another reference view; with ``reference`` pairs, the pairs change with it."""
@@ -203,6 +219,15 @@ class Matcher:
         end = space.width - np.maximum(0, np.maximum(whole_i + (phase_i > 0), whole_j + (phase_j > 0)))
         return np.stack([low, np.maximum(0, end - low), phase_i, low + whole_i, phase_j, low + whole_j], axis=1)
 
+    # kept, as every few rows ask for them: anew they would take a tenth of the time
+    @cached_property
+    def _all_spans(self) -> list[NDArray[np.int64]]:
+        return [self.spans(i, j) for i, j in self.pairs]
+
+    @cached_property
+    def _all_ray_spans(self) -> list[NDArray[np.int64]]:
+        return [self.ray_spans(i, j) for i, j in self.pairs]
+
     def disparity(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
         """Fractional plane indices of the space as disparities in pixels per view step of the given scene."""
         scale = np.float32(1 / (self.space.fineness * self.step))
@@ -245,10 +270,11 @@ class Matcher:
     def phases(self) -> Features:
         """Rows and their features sorted by phase within a pixel, so that every q-th sample is read contiguously."""
         parts = (by_phase(part, self.space.fineness) for part in (self.rows, self.slopes, self.bits, self.masks))
-        return Features(*parts)  # type: ignore[arg-type]
+        return Features(*parts, self.descriptors)  # type: ignore[call-arg, arg-type]
 
     def _fill(self, first: int, out: NDArray[np.uint8]) -> None:
-        whole = Features(self.rows[:, None], self.slopes[:, None], self.bits[:, None], self.masks[:, None])
+        sorted_ones = (self.rows[:, None], self.slopes[:, None], self.bits[:, None], self.masks[:, None])
+        whole = Features(*sorted_ones, self.descriptors)
         self._compare(whole, first, out, on_rays=False)
 
     def _compare(
@@ -263,6 +289,7 @@ class Matcher:
             "linear": (SQUARES, LINEAR, (limit or 255.0) ** -2),
             "census": (CENSUS, LINEAR, 1.0),
             "mixed": (MIXED, LINEAR, 1.0),
+            "mccnn": (LEARNED, LINEAR, 1.0),
         }[settings.similarity]
         limit = len(channels) * limit if measure == MIXED else limit**2
         criterion = Criterion(
@@ -273,14 +300,16 @@ class Matcher:
             (0,) * bool(features.masks.size),
             channels,
             (0,) * side,
+            self.space.fineness if on_rays else 1,
         )
+        spans, fineness = (self._all_ray_spans, 1) if on_rays else (self._all_spans, self.space.fineness)
         for p, (i, j) in enumerate(self.pairs):
             pair_rows(
                 features.of(i),
                 features.of(j),
                 criterion,
-                self.ray_spans(i, j) if on_rays else self.spans(i, j),
-                1 if on_rays else self.space.fineness,
+                spans[p],
+                fineness,
                 first,
                 p,
                 out,

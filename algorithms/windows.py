@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from matbench.algorithms.features import CENSUS_BITS, CENSUS_WORDS
 from matbench.algorithms.kernels import fill, helper, inlined, kernel, popcount
+from matbench.algorithms.mccnn import CHANNELS, STEPS
 
 FULL = 255  # a stored similarity of 1: similarities are kept in one byte
 COLOUR, SLOPE, ORDER = 0.35, 0.25, 0.40  # weights of the three costs of ``mixed``
 COLOUR_SPAN, SLOPE_SPAN, ORDER_SPAN = 20.0, 10.0, 20.0  # differences that cost the whole weight
-SQUARES, CENSUS, MIXED = range(3)  # what is averaged over a window
+SQUARES, CENSUS, MIXED, LEARNED = range(4)  # what is averaged over a window
 EXPONENTIAL, ROOT, LINEAR = range(3)  # how the mean becomes a similarity
 TILE = 4  # planes
 
@@ -33,16 +34,19 @@ class Features(NamedTuple):
     bits, masks
         (views, phases, words, H, samples) uint16: census of the luma, and which of its pixels are likely
         on the same surface as the middle one.
+    descriptors
+        (views, H, all samples, 64) int8, see `mccnn.descriptors`; not sorted, as each is read as a whole.
     """
 
     rows: NDArray[np.float32]
     slopes: NDArray[np.float32]
     bits: NDArray[np.uint16]
     masks: NDArray[np.uint16]
+    descriptors: NDArray[np.int8]
 
     def of(self, view: int) -> "Features":
         """Those of one view."""
-        return Features(self.rows[view], self.slopes[view], self.bits[view], self.masks[view])
+        return Features(*(part[view] for part in self))
 
 
 class Criterion(NamedTuple):
@@ -61,6 +65,8 @@ class Criterion(NamedTuple):
     channels, taps
         Tuples as long as there are channels, and taps along a side of the window. Their lengths are known to the
         compiler, so that it can unroll loops.
+    apart
+        How many samples lie from a column to the next, where `descriptors` are compared.
     """
 
     measure: int
@@ -70,6 +76,7 @@ class Criterion(NamedTuple):
     masked: tuple[int, ...]
     channels: tuple[int, ...]
     taps: tuple[int, ...]
+    apart: int
 
 
 @helper
@@ -140,6 +147,18 @@ def _mixed_difference(  # type: ignore[no-untyped-def]
         if len(masked) > 0:
             differ = bits * differ / np.float32(compared[x])
         out[x] = colour * min(total, limit) + slope * min(steep, steepest) + order * min(differ, most)
+
+
+@helper
+def _angle(left, right, fi, ui, fj, uj, apart, row, out):  # type: ignore[no-untyped-def]
+    """out = min(1 - f g, 1): descriptors that are at right angles, or further apart, have nothing in common."""
+    zero, one, share = np.float32(0), np.float32(1), np.float32(1 / STEPS**2)
+    for x in range(np.uintp(out.size)):
+        one_of, other = left[row, (x + ui) * apart + fi], right[row, (x + uj) * apart + fj]
+        total = np.int32(0)
+        for c in range(CHANNELS):
+            total += np.int32(one_of[c]) * np.int32(other[c])
+        out[x] = min(max(one - share * np.float32(total), zero), one)
 
 
 @helper
@@ -219,7 +238,7 @@ def pair_rows(left, right, criterion, spans, fineness, y0, p, out):  # type: ign
         Samples from tap to tap.
     """
     height, samples = left.rows.shape[2], left.rows.shape[3]
-    measure, shape, rate, limit, masked, channels, taps = criterion
+    measure, shape, rate, limit, masked, channels, taps, apart = criterion
     side = len(taps)
     radius = side // 2
     reach = radius * fineness
@@ -247,6 +266,8 @@ def pair_rows(left, right, criterion, spans, fineness, y0, p, out):  # type: ign
                     fill(zero, cost)
                 elif measure == SQUARES:
                     square_difference(left.rows, right.rows, fi, ui, fj, uj, row, channels, limit, cost)
+                elif measure == LEARNED:
+                    _angle(left.descriptors, right.descriptors, fi, ui, fj, uj, apart, row, cost)
                 else:
                     differ, among = differing[:width], compared[:width]
                     if len(masked) > 0:

@@ -5,6 +5,11 @@ row from the upper left one; ``gt_disp_lowres.pfm``, the truth of the centre vie
 ``gt_disp_lowres_Cam000.pfm`` and so on, that of all views; and ``parameters.cfg``. Disparities have a sign. The
 benchmark's thresholds are in pixels between neighbouring views, so two neighbours are its pair.
 
+The benchmark leaves the outer 15 pixels out: that is region ``inner``. Its masks of the centre view (``mask_planes``,
+``mask_smooth_surfaces``, ``mask_discontinuities``, ``mask_fine``, ``mask_fine_surrounding``, each with
+``_lowres.png``) are regions where they are there. Its program scores the last three on maps of ten times the size;
+matbench does not.
+
 Reference: Honauer, Johannsen, Kondermann & Goldluecke, ACCV 2016.
 """
 
@@ -37,6 +42,8 @@ SCENES = {
 }
 _CATEGORY = {name: category for category, names in SCENES.items() for name in names.split()}
 _CENTRE = SIDE // 2
+_BORDER = 15
+_MASKS = ("planes", "smooth_surfaces", "discontinuities", "fine", "fine_surrounding")
 _TRUTH = "gt_disp_lowres.pfm"
 _UNPUBLISHED = "test"  # the category whose truth its makers keep
 _LARGEST_CFG = 1 << 16
@@ -80,6 +87,7 @@ class HCI:
             raise UserError(f"{called} is not in {root / 'hci' / _CATEGORY[name] / name}")
         folder, places = folders[name], _places(called, options)
         truth: dict[int, TruthFile] = {}
+        masks = {name: path for name in _MASKS if (path := folder / f"mask_{name}_lowres.png").is_file()}
         for index, place in enumerate(places):
             files = [_TRUTH] if place == SIDE * SIDE // 2 else []
             files.append(f"gt_disp_lowres_Cam{place:03}.pfm")
@@ -91,6 +99,9 @@ class HCI:
             labels=tuple(str(k) for k in range(SIDE)),
             disparities=read_range(folder),
             truth=truth,
+            masks={place: masks for place, view in enumerate(places) if view == SIDE * SIDE // 2},
+            border=_BORDER,
+            metrics="hci",
             column="column" in options,
         )
         return stored.load(options)

@@ -3,8 +3,7 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Sequence
-from math import ceil, floor
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,21 +11,28 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench.datasets.folder import MOST_VIEWS, TOML
+from matbench.datasets.measuring import Measured, measure
 from matbench.datasets.pair import CALIBRATION
-from matbench.errors import UserError
-from matbench.files.images import encoding, read_rgb, read_size
+from matbench.datasets.stored import inside
+from matbench.errors import UserError, refuse_hidden
+from matbench.files.images import ENDINGS, encoding, read_rgb, read_size
+from matbench.files.maps import read_map
 from matbench.files.writing import write_text
 from matbench.scene import Range
-from matbench.scenes import alignment
+from matbench.scenes.scene_check import zeros_beside
 
-_IMAGES = (".png", ".ppm", ".pgm")
-_NOT_READ = (".bmp", ".exr", ".gif", ".jpeg", ".jpg", ".tif", ".tiff", ".webp")
+_NOT_READ = (".bmp", ".exr", ".gif", ".heic", ".webp")
 _NO_VIEW = re.compile(r"disp(?!lay)|depth|truth|mask|n?o?nocc|(^|[^a-z])gt([^a-z]|$)", re.IGNORECASE)
-_MEASURED = 24  # at most this many views are matched; their order is measured only if there are no more
 _COLOURS = 8  # an image with no more colours is a mask
-_SURE = 40  # matched features from which a range is guessed
-_MARGIN = 0.5  # of the largest measured disparity: there may be few features on the nearest surface
-_OUT_OF_ORDER = 0.3  # of a view step
+
+
+@frozen
+class Truth:
+    """A file of true disparities, how it stores them, and whether 0 seems to mean unknown."""
+
+    name: str
+    kind: str
+    is_zero_unknown: bool
 
 
 @frozen
@@ -58,7 +64,8 @@ def write_scene_toml(folder: Path, disparities: tuple[float, float] | None = Non
     Raises
     ------
     UserError
-        If there are fewer than two images of one size, or the folder is a scene already.
+        If there are fewer than two images of one size, one is a link that leads out of the folder, or the folder is a
+        scene already.
     """
     if not folder.is_dir():
         raise UserError(f"folder {str(folder)!r} does not exist")
@@ -68,20 +75,32 @@ def write_scene_toml(folder: Path, disparities: tuple[float, float] | None = Non
     given = None if disparities is None else Range(*disparities)
     names, remarks = _views(folder)
     images = {name: read_rgb(folder / name) for name in names}
-    masks = [name for name, image in images.items() if _is_mask(image)]
-    if len(masks) < len(names):  # if all have few colours they are views all the same, such as random dots
-        names = [name for name in names if name not in masks]
-        remarks += [f"left out: {name}, a mask: it has no more than {_COLOURS} colours" for name in masks]
-        _check_count(folder, names)
-    order, measured, notes = _measure(names, [images[name] for name in names])
-    names = [names[index] for index in order]
-    chosen = given or measured or Range(0, max(1, read_size(folder / names[0])[0] // (8 * (len(names) - 1))))
+    for what, is_one in (("a mask", _is_mask), ("grey where the others are coloured, as maps and masks are", _is_grey)):
+        others = [name for name, image in images.items() if is_one(image)]
+        # if most are so they are views all the same, such as random dots
+        if others and (what == "a mask" or 2 * len(others) < len(images)) and len(others) < len(images):
+            remarks += [f"left out: {name}, {what}" for name in others]
+            images = {name: image for name, image in images.items() if name not in others}
+            _check_count(folder, list(images))
+    found = measure(images)
+    chosen = given or found.disparities or Range(0, max(1, _width(images, found) // (8 * (len(found.names) - 1))))
+    remarks += found.remarks
     if given is None:
-        guess = "measured on matched features, with a wide margin" if measured else "A GUESS: too few features match"
-        notes.append(f"disparities {chosen} px per view step: {guess}; set them yourself where you know them")
+        how = (
+            "measured on matched features, with a wide margin"
+            if found.disparities
+            else "A GUESS: too few features match"
+        )
+        remarks.append(f"disparities {chosen} px per view step: {how}; set them yourself where you know them")
+    truth, told = _truth(folder, found.names)
     path = folder / TOML
-    write_text(path, _text(names, chosen, given is not None, bool(measured), _truth(folder, names)))
-    return Draft(path, (*remarks, *notes))
+    write_text(path, _text(found, chosen, given is not None, truth))
+    return Draft(path, (*remarks, *told))
+
+
+def _width(images: Mapping[str, NDArray[np.uint8]], found: Measured) -> int:
+    """Of a row along which views were taken."""
+    return int(images[found.names[0]].shape[0 if found.vertical else 1])
 
 
 def natural(name: str) -> list[tuple[int, str]]:
@@ -96,18 +115,17 @@ def natural(name: str) -> list[tuple[int, str]]:
 
 def _views(folder: Path) -> tuple[list[str], list[str]]:
     """Names of the images that are taken as views, and remarks on those that are not."""
-    files = [path for path in folder.iterdir() if path.suffix.lower() in _IMAGES and path.is_file()]
+    files = [path for path in folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file()]
     images = sorted((path.name for path in files if not _NO_VIEW.search(path.stem)), key=natural)
     sizes: dict[str, tuple[int, int]] = {}
     remarks = []
     for name in images:
+        file = inside(folder, name)  # as whoever reads the scene asks for
         try:
-            json.dumps(name, ensure_ascii=False).encode("utf-8")
-            sizes[name] = read_size(folder / name)
+            refuse_hidden("picture", name)
+            sizes[name] = read_size(file)
         except UserError as error:
             remarks.append(f"left out: {error}")
-        except UnicodeEncodeError:
-            remarks.append(f"left out: {name!r}, whose name is no text")
     _check_count(folder, list(sizes))
     size = Counter(sizes.values()).most_common(1)[0][0]
     names = [name for name in sizes if sizes[name] == size]
@@ -124,7 +142,8 @@ def _check_count(folder: Path, names: Sequence[str]) -> None:
         others = sorted({path.suffix for path in folder.iterdir() if path.suffix.lower() in _NOT_READ})
         hint = f"; {', '.join(others)} are not read: save them as PNG" if others else ""
         raise UserError(
-            f"{folder} has too few images: at least two views (PNG, or binary PPM or PGM), found: {found}{hint}"
+            f"{folder} has too few images: at least two views (PNG, JPEG, TIFF, or binary PPM or PGM), "
+            f"found: {found}{hint}"
         )
 
 
@@ -137,53 +156,29 @@ def _is_mask(image: NDArray[np.uint8]) -> bool:
     return True
 
 
-def _measure(names: Sequence[str], images: Sequence[NDArray[np.uint8]]) -> tuple[list[int], Range | None, list[str]]:
-    """Indices of the views from left to right, the range of disparities (None if unknown), and remarks."""
-    count, ref = min(len(images), _MEASURED), (min(len(images), _MEASURED) - 1) // 2
-    matches = alignment.match(np.stack(images[:count]), ref)
-    places = alignment.places(matches, count, ref)
-    given = list(range(len(images)))
-    if places is None or not np.isfinite(places).all():
-        strange = (
-            []
-            if places is None
-            else [name for name, place in zip(names, places, strict=False) if not np.isfinite(place)]
-        )
-        match = f"match in {', '.join(strange)}: are these views of this scene?" if strange else "match to measure it"
-        return given, None, [f"the order of the views is that of their names: too few features {match}"]
-    found = alignment.disparities(matches, places)
-    order, notes = given, []
-    # most disparities are positive in a scene: if they come out negative, the names run from right to left
-    if len(found) and np.median(found) < 0 and np.mean(found < 0) > 0.9:
-        places, found = -places, -found
-    if count == len(images):
-        order = [int(index) for index in np.argsort(places, kind="stable")]
-        if order != given:
-            notes.append("the views are listed as they were taken, left to right, not by their names")
-        apart = np.abs(np.diff(places[order]) - 1).max()
-        if apart > _OUT_OF_ORDER:
-            notes.append("the views were not taken at even steps: matbench needs even steps")
-    if len(found) < _SURE:
-        return order, None, notes
-    low, high = (float(value) for value in np.quantile(found, (0.01, 0.99)))
-    margin = 2 + _MARGIN * max(-low, high)
-    return order, Range(floor(low - margin) if low < 0 else 0, ceil(high + margin)), notes
+def _is_grey(image: NDArray[np.uint8]) -> bool:
+    return bool((image[::16] == image[::16, :, :1]).all() and (image == image[..., :1]).all())
 
 
-def _truth(folder: Path, names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """View -> the truth file that seems to belong to it, and that file's encoding."""
-    found: dict[str, tuple[str, str]] = {}
-    files = sorted((path.name for path in folder.iterdir() if path.suffix.lower() in (*_IMAGES, ".pfm")), key=natural)
+def _truth(folder: Path, names: Sequence[str]) -> tuple[dict[str, Truth], list[str]]:
+    """View -> the truth file that seems to belong to it; remarks."""
+    found: dict[str, Truth] = {}
+    remarks = []
+    numbers = (".pfm", ".npy", ".npz")
+    files = sorted((path.name for path in folder.iterdir() if path.suffix.lower() in (*ENDINGS, *numbers)), key=natural)
     for file in files:
-        if file in names or not (_NO_VIEW.search(file) or file.lower().endswith(".pfm")):
+        if file in names or not (_NO_VIEW.search(file) or file.lower().endswith(numbers)):
             continue
         view = next((name for name in names if _belongs(file, name)), None)
         if view is not None and view not in found and not re.search(r"mask|nocc|depth", file, re.IGNORECASE):
             try:
-                found[view] = file, encoding(folder / file)
+                kind = encoding(inside(folder, file))
+                zeros = "" if kind.startswith("grey") else zeros_beside(read_map(inside(folder, file)))
             except UserError:
                 continue
-    return found
+            found[view] = Truth(file, kind, bool(zeros))
+            remarks += [f"{file}: {zeros}, so it is taken for unknown"] if zeros else []
+    return found, remarks
 
 
 def _belongs(truth: str, view: str) -> bool:
@@ -194,25 +189,29 @@ def _belongs(truth: str, view: str) -> bool:
     return Path(view).stem.lower() in truth.lower()
 
 
-def _text(
-    names: Sequence[str],
-    disparities: Range,
-    is_given: bool,
-    is_measured: bool,
-    truth: dict[str, tuple[str, str]],
-) -> str:
+def _text(found: Measured, disparities: Range, is_given: bool, truth: Mapping[str, Truth]) -> str:
     def said(name: str) -> str:
         return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")
 
+    names = found.names
     listed = "\n".join(f"    {said(name)}," for name in names)
-    source = "" if is_given else "; measured, with a wide margin" if is_measured else "; A GUESS, set it"
+    source = "" if is_given else "; measured, with a wide margin" if found.disparities else "; A GUESS, set it"
     middle = names[(len(names) - 1) // 2]
+    if found.vertical:
+        order = ["# from top to bottom: nearer points move up from each view to the next", "vertical = true"]
+    else:
+        order = ["# from left to right: nearer points move left from each view to the next"]
+    places = []
+    if found.positions:
+        told = ", ".join(f"{place:g}" for place in found.positions)
+        places = ["", "# where they were taken, in view steps; measured", f"positions = [{told}]"]
     lines = [
-        "# A scene: rectified views, taken at even steps along a line.",
+        "# A scene: rectified views, taken along a line.",
         "# 'matbench scene check' measures whether it is one, 'matbench scene show' draws it.",
         "",
-        "# from left to right: nearer points move left from each view to the next",
+        *order,
         f"views = [\n{listed}\n]",
+        *places,
         "",
         f"# least and largest, pixels per view step (between neighbouring views){source}",
         f"disparities = [{disparities.least:g}, {disparities.largest:g}]",
@@ -223,13 +222,14 @@ def _text(
         "# errors are given in pixels between views so many steps apart; by default neighbours",
         "# pair_steps = 1",
     ]
-    for view, (file, kind) in (truth or {middle: ("truth.png", "grey8")}).items():
+    for view, file in (truth or {middle: Truth("truth.png", "grey8", False)}).items():
         # the numbers of a grey picture mean nothing without their scale, which only a person knows
-        off = "" if kind == "pfm" and truth else "# "
-        lines += ["", f"{off}[truth.{said(view)}]", f"{off}file = {said(file)}"]
-        if kind == "pfm" and truth:
+        is_sure = not file.kind.startswith("grey")
+        off = "" if is_sure else "# "
+        lines += ["", f"{off}[truth.{said(view)}]", f"{off}file = {said(file.name)}"]
+        if is_sure:
             lines.append("# scale = 1    # stored number of one pixel per view step")
         else:
             lines.append("# scale = 16   # SET IT: the grey level of one pixel per view step")
-        lines.append("# unknown = 0  # stored number that means unknown")
+        lines.append(f"{'' if file.is_zero_unknown else '# '}unknown = 0  # stored number that means unknown")
     return "\n".join(lines) + "\n"

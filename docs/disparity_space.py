@@ -5,10 +5,11 @@ python docs/disparity_space.py
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from matbench.drawing import style
 
 VIEWS, PLANES, PIXELS = 3, range(1, 5), range(9)
 COLOURS = ("#0072b2", "#d55e00", "#6a51a3")
@@ -46,8 +47,8 @@ def points(axes: Axes, world: bool) -> None:
     axes.plot(*(above(x, d) if world else (x, d)), "o", color="black", ms=8, zorder=4)
 
 
+@style({"svg.fonttype": "none", "svg.hashsalt": "matbench", "font.size": 9})
 def main() -> None:
-    mpl.rcParams |= {"svg.fonttype": "none", "svg.hashsalt": "matbench", "font.size": 9}
     figure = Figure(figsize=(9, 3.9), layout="constrained")
     scene, space = figure.subplots(1, 2)
     for axes, world in ((scene, True), (space, False)):

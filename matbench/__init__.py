@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matbench.algorithm import Algorithm, Context, Estimate, Probe
     from matbench.comparison import compare
     from matbench.errors import UserError
+    from matbench.measures.families import Family
     from matbench.measures.metrics import MapInRegion, Metric
     from matbench.measures.prediction import PredictionMetric
     from matbench.measures.volume_metrics import VolumeMetric
@@ -29,6 +30,7 @@ _HOMES = {
     "DisparitySpace": "space",
     "Download": "scenes.dataset",
     "Estimate": "algorithm",
+    "Family": "measures.families",
     "Listing": "scenes.dataset",
     "MapInRegion": "measures.metrics",
     "Metric": "measures.metrics",
@@ -53,6 +55,7 @@ __all__ = [
     "DisparitySpace",
     "Download",
     "Estimate",
+    "Family",
     "Listing",
     "MapInRegion",
     "Metric",

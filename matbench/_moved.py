@@ -1,7 +1,8 @@
-"""Old names of modules that have moved into packages: plug-ins of others go on importing them, and are warned."""
+"""Old names of modules and of what is in them: plug-ins of others go on importing them, and are warned."""
 
 import sys
 import warnings
+from functools import partial
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
@@ -28,8 +29,30 @@ MODULES = {
 }
 """Old name -> where it is now."""
 
-SCENES = ("data_root", "listings", "load_scene", "select")
-"""What was in the module ``matbench.scenes``, now a package: it is in `matbench.scenes.catalogue`."""
+NAMES = {
+    "matbench.cluster": {"Keepers": "matbench.solving.cluster_worker.Keepers"},
+    "matbench.contract": {
+        "Finding": "matbench.solving.check_verdicts.CheckResult",
+        "Trial": "matbench.solving.check_scenes.Trial",
+        "Verdict": "matbench.solving.check_verdicts.Verdict",
+        "mirrored": "matbench.solving.check_scenes.mirrored",
+    },
+    "matbench.keeper": {
+        "Child": "matbench.solving.child.Child",
+        "Dismissed": "matbench.solving.keeper_process.Dismissed",
+    },
+    "matbench.reports.paper_figure": {"look": "matbench.reports.paper_figure.small_print"},
+    "matbench.scenes": {
+        name: f"matbench.scenes.catalogue.{name}" for name in ("data_root", "listings", "load_scene", "select")
+    },
+    "matbench.spec": {name: f"matbench.parameters.{name}" for name in ("build", "flat")},
+    "matbench.store": {
+        "FINAL": "matbench.runs.outcome.FINAL",
+        "FolderLost": "matbench.runs.stopped.FolderLost",
+        "Status": "matbench.runs.outcome.Status",
+    },
+}
+"""Module under the name that was documented -> what was in it, and is elsewhere now or has another name."""
 
 
 def _warn(old: str, new: str, stacklevel: int) -> None:
@@ -56,22 +79,26 @@ class Finder:
     def exec_module(self, module: ModuleType) -> None:
         """Put the new module in the place of the old one: both names mean the same."""
         _warn(module.__name__, MODULES[module.__name__], 2)
-        sys.modules[module.__name__] = import_module(MODULES[module.__name__])
+        new = import_module(MODULES[module.__name__])
+        if module.__name__ in NAMES:
+            vars(new).setdefault("__getattr__", partial(moved_name, module.__name__))
+        sys.modules[module.__name__] = new
 
 
-def scene_name(name: str) -> Any:
-    """One of `SCENES`, taken from ``matbench.scenes``.
+def moved_name(module: str, name: str) -> Any:
+    """One of `NAMES` of a module.
 
     Raises
     ------
     AttributeError
         For any other name.
     """
-    if name not in SCENES:
-        raise AttributeError(f"module 'matbench.scenes' has no attribute {name!r}")
-    _warn(f"matbench.scenes.{name}", f"matbench.scenes.catalogue.{name}", 2)
-    value = getattr(import_module("matbench.scenes.catalogue"), name)
-    setattr(sys.modules["matbench.scenes"], name, value)  # one warning is enough
+    if name not in NAMES[module]:
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+    home, _, now = NAMES[module][name].rpartition(".")
+    _warn(f"{module}.{name}", f"{home}.{now}", 2)
+    value = getattr(import_module(home), now)
+    setattr(sys.modules[module], name, value)  # one warning is enough
     return value
 
 

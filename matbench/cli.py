@@ -1,6 +1,5 @@
 """The command line: all commands of `matbench` put together. Each is imported when it is typed."""
 
-import os
 import sys
 import warnings
 from collections.abc import Sequence
@@ -8,9 +7,11 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from matbench._version import __version__
-from matbench.commands import ablate, compare, view
-from matbench.commands.console import DONE, INTERRUPTED, WRONG_USAGE
-from matbench.errors import UserError
+from matbench.commands import ablate, compare, streams, view
+from matbench.commands.console import DONE, FAILED, INTERRUPTED, WRONG_USAGE, complain
+from matbench.errors import UserError, cause, refuse_hidden
+from matbench.files.own_folders import forget_relative_home
+from matbench.safe_text import printable
 
 app = App(
     name="matbench",
@@ -18,7 +19,7 @@ app = App(
     help_epilogue="""\
 **Examples**
 
-`matbench compare`  all built-in methods on three synthetic scenes and the paper's three
+`matbench compare`  seven methods on twelve random worlds and the paper's three
 
 `matbench compare -a sgbm -a 'materiality[views=4,5]' -s 'middlebury2006/*' --data DATA`
 
@@ -55,6 +56,7 @@ for _quick in (compare, ablate, view):
     app.command(_quick.app)
 # imported when they are typed; what is said here saves importing them for the list of commands
 COMMANDS = {
+    "maps": "Look at ready-made disparity maps before they are scored.",
     "list": "Show algorithms with their parameters, scenes with their sizes, and metrics.",
     "bench": "Measure speed: against stored ratios, or a commit.",
     "check": "Try methods: do they keep to what is asked of them?",
@@ -73,7 +75,11 @@ for _name, _help in COMMANDS.items():
 def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0 all well, 1 something failed, 2 wrong usage, 3 a regression, 130 interrupted."""
     warnings.formatwarning = _warning
+    forget_relative_home()
     try:
+        for one in sys.argv[1:] if tokens is None else tokens:
+            if one != one.encode("utf-8", "replace").decode("utf-8"):  # a file's name in another encoding
+                refuse_hidden("argument", one)
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except UserError as error:
         status = _refuse(str(error))
@@ -84,13 +90,13 @@ def main(tokens: Sequence[str] | None = None) -> None:
     except CycloptsError as error:
         status = _refuse(" ".join(str(error).split()))
     except KeyboardInterrupt:
-        print("matbench: interrupted", file=sys.stderr)
+        complain("interrupted")
         status = INTERRUPTED
-    except BrokenPipeError:  # whoever read the output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = DONE
     except OSError as error:
-        status = _refuse(f"{error.filename or 'output'}: {error.strerror}")
+        status = _refuse(f"{error.filename}: {cause(error)}" if error.filename else cause(error))
+    if why := streams.fault():
+        complain(f"standard output could not be written: {why}")
+        status = status or (DONE if streams.is_spare() else FAILED)
     sys.exit(status)
 
 
@@ -102,10 +108,11 @@ def _warning(
     line: str | None = None,  # noqa: ARG001 -- the standard library gives it
 ) -> str:
     """A warning in one line; what the harness says to users goes without a line of its code."""
+    message = str(message).strip().partition("\n")[0]  # numba adds a traceback where a variable is no number
     place = "" if category is UserWarning else f"{filename}:{lineno}: {category.__name__}: "
-    return f"matbench: {place}{message}\n"
+    return f"matbench: {place}{printable(str(message))}\n"
 
 
 def _refuse(message: str) -> int:
-    print(f"matbench: {' '.join(message.splitlines())}", file=sys.stderr)
+    complain(message)
     return WRONG_USAGE

@@ -19,8 +19,9 @@ import sys
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from errno import EFBIG
 from functools import cache
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from importlib.machinery import EXTENSION_SUFFIXES, SOURCE_SUFFIXES, ModuleSpec, PathFinder
 from pathlib import Path
 
@@ -30,10 +31,12 @@ from matbench.syntax import Facts, Import, facts
 
 HARNESS = "matbench"
 NOT_THERE = "none"
+_LARGEST_SOURCE, _LARGEST = 1 << 23, 1 << 32  # bytes; reading a source as one takes a hundred times its size
 _SUFFIXES = (*EXTENSION_SUFFIXES, *SOURCE_SUFFIXES)
 _INSTALLED = ("site-packages", "dist-packages")
-# (importer, module) not followed: `Scene.scored_regions` needs ground truth, which no method is given
-_ASIDE = {("matbench.scene", "matbench.regions")}
+# (importer, module) not followed: `Scene.scored_regions` needs ground truth, which no method is given; where compiled
+# kernels are kept changes no answer
+_ASIDE = {("matbench.scene", "matbench.regions"), ("matbench.algorithms.kernels", "matbench.plans.kernel_cache")}
 
 
 @frozen
@@ -79,28 +82,13 @@ def of_file(path: Path, alone: bool = False) -> Code:
     OSError
         If it cannot be read.
     """
-    found = facts(path.read_bytes(), is_package=False)
+    found = _facts(path, is_package=False)
     name = f".{path.stem}"
     if alone:
         return Code({name: found.digest}, {name: path})
     reader = _Reader(path.parent, frozenset())
     reader.count(_Found(name, str(path), None))
     return reader.read()
-
-
-def of_content(path: Path) -> str:
-    """SHA-256 of a file, or of all files below a folder with their names.
-
-    Raises
-    ------
-    OSError
-        If one cannot be read.
-    """
-    if not path.is_dir():
-        return sha256(path.read_bytes()).hexdigest()
-    files = sorted(file for file in path.rglob("*") if file.is_file())
-    each = [f"{file.relative_to(path).as_posix()}\0{of_content(file)}" for file in files]
-    return sha256("\0".join(each).encode()).hexdigest()
 
 
 def lies_beside(folder: Path, top: str) -> bool:
@@ -158,22 +146,20 @@ class _Reader:
             return
         path = Path(module.file)
         try:
-            content = path.read_bytes()
+            is_source = path.suffix in SOURCE_SUFFIXES
+            found = _facts(path, module.inside is not None) if is_source else Facts(_digest(path))
         except OSError:  # who imports it gets the error
             self.parts[module.name] = "unreadable"
             return
         self.files[module.name] = path
-        if path.suffix in SOURCE_SUFFIXES:
-            found = facts(content, module.inside is not None)
-            self.parts[module.name] = found.digest
-            self._todo.append((module, found))
-        else:
-            self.parts[module.name] = sha256(content).hexdigest()
+        self.parts[module.name] = found.digest
+        self._todo.append((module, found))
 
     def follow(self, importer: str, what: Import) -> None:
         """Count what an import brings in."""
         name = self._meant(importer, what.module)
-        if (importer, name) in _ASIDE or (name, what.name) in self._seen:
+        wanted = {(importer, name), (importer, f"{name}.{what.name}")}
+        if not wanted.isdisjoint(_ASIDE) or (name, what.name) in self._seen:
             return
         self._seen.add((name, what.name))
         top = name.partition(".")[0]
@@ -222,7 +208,7 @@ class _Reader:
         """Name -> import, for the names that a package itself imports."""
         if package.file is not None and package.file.endswith(tuple(SOURCE_SUFFIXES)):
             with suppress(OSError):
-                return facts(Path(package.file).read_bytes(), is_package=True).names
+                return _facts(Path(package.file), is_package=True).names
         return {}
 
     def _meant(self, importer: str, name: str) -> str:
@@ -248,6 +234,27 @@ class _Reader:
             return None
         found = _in_folders(last, package.inside)
         return _Found(name, found.file, found.inside) if found else _by_finders(name, package.inside)
+
+
+def _facts(path: Path, is_package: bool) -> Facts:
+    """What a source tells; of a file that is larger than any source, the digest of its bytes and nothing else."""
+    if path.stat().st_size > _LARGEST_SOURCE:
+        return Facts(_digest(path))
+    return facts(path.read_bytes(), is_package)
+
+
+def _digest(path: Path) -> str:
+    """SHA-256 of a file, which is never in memory as a whole.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, or is larger than any module.
+    """
+    with path.open("rb") as file:
+        if os.fstat(file.fileno()).st_size > _LARGEST:
+            raise OSError(EFBIG, os.strerror(EFBIG), str(path))
+        return file_digest(file, "sha256").hexdigest()
 
 
 def _is_harness(module: _Found) -> bool:

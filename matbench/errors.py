@@ -1,14 +1,15 @@
 """The one kind of error that a user can put right, and what any other error says, in one line."""
 
-import re
 import sysconfig
 import traceback
 from collections.abc import Iterable
 from difflib import get_close_matches
+from errno import EDQUOT, EMFILE, ENOENT
 from pathlib import Path
 from subprocess import CalledProcessError
 
-_COLOURS = re.compile(r"\x1b\[[0-9;]*m")  # as compilers print them
+from matbench import safe_text
+
 _HARNESS = Path(__file__).parent
 _METHODS = _HARNESS / "algorithms"
 _LIBRARIES = {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
@@ -37,12 +38,37 @@ def unknown(kind: str, value: str, possible: Iterable[str]) -> UserError:
     "unknown algorithm 'sgmb': did you mean 'sgbm'? Possible: okutomi_kanade, sgbm"
     >>> str(unknown("preset of sgbm", "best", []))
     "unknown preset 'best' of sgbm: Possible: none"
+    >>> str(unknown("metric", "D1", ["a1", "d1"]))
+    "unknown metric 'D1': did you mean 'd1'? Possible: a1, d1"
     """
     names = sorted(possible)
-    near = get_close_matches(value, names, n=1)
+    # a name in other letters first: `D1` is `d1`, however little a pair of them has in common
+    near = [name for name in names if name.casefold() == value.casefold()] or get_close_matches(value, names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
     noun, blank, of_what = kind.partition(" ")
     return UserError(f"unknown {noun} {value!r}{blank}{of_what}: {hint}Possible: {', '.join(names) or 'none'}")
+
+
+LONGEST_NAME = 4096
+"""Characters of a name, as many as a path may have. Setting a name of 100,000 in tables and figures takes a minute."""
+
+
+def refuse_hidden(what: str, text: str) -> None:
+    r"""Raise UserError where a name, or a value that becomes part of one, has no end, or holds what nobody can see.
+
+    All names go through here: of methods, scenes, views, regions and metrics, parameters and options with their
+    values, plug-in files and run folders. So what is accepted can be printed, stored, and read back as it was.
+
+    >>> refuse_hidden("output folder", "runs/first")
+    >>> refuse_hidden("output folder", "runs/a\tb")
+    Traceback (most recent call last):
+        ...
+    matbench.errors.UserError: output folder 'runs/a\tb' holds a tab: names may hold only what can be seen
+    """
+    if len(text) > LONGEST_NAME:
+        raise UserError(f"{what} has {len(text)} characters: names may have {LONGEST_NAME}")
+    if found := safe_text.hidden_in(text):
+        raise UserError(f"{what} '{safe_text.printable(text)}' holds {found}: names may hold only what can be seen")
 
 
 def one_line(error: BaseException) -> str:
@@ -64,12 +90,34 @@ def one_line(error: BaseException) -> str:
     if isinstance(error, CalledProcessError) and error.stderr:
         printed = error.stderr if isinstance(error.stderr, str) else error.stderr.decode("utf-8", "replace")
         said += f" It printed: {(printed.splitlines() or [''])[-1]}"
-    plain = "".join(c if c.isprintable() else " " for c in _COLOURS.sub("", said))
-    words = " ".join(plain.split())
+    words = safe_text.one_line(said)
     if len(words) > _MOST:
         ends = words[: _MOST // 2], words[-_MOST // 2 :]
         words = f" ... {len(words) - _MOST} characters left out ... ".join(ends)
     return words or type(error).__name__
+
+
+def cause(error: OSError) -> str:
+    """What the system refused, in words, and what to do where the system's words do not tell.
+
+    >>> cause(OSError(28, "No space left on device"))
+    'No space left on device'
+    >>> cause(OSError(24, "Too many open files"))
+    'Too many open files: raise their number with ulimit -n'
+    """
+    if error.errno == ENOENT and not _has_working_folder():
+        return "the working folder has been deleted: change into another one"
+    said = error.strerror or one_line(error)
+    hint = {EMFILE: "raise their number with ulimit -n", EDQUOT: "remove some of your files"}.get(error.errno or 0)
+    return f"{said}: {hint}" if hint else said
+
+
+def _has_working_folder() -> bool:
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return False
+    return True
 
 
 def where(error: BaseException) -> str:

@@ -10,11 +10,11 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from attrs import Factory, evolve, fields_dict, frozen, has
+from attrs import Attribute, Factory, evolve, fields_dict, frozen, has
 from cattrs import Converter
 
 from matbench.errors import UserError, failure, one_line, unknown
-from matbench.spec import Value, typed
+from matbench.typed import Value, typed
 
 T = TypeVar("T")
 
@@ -256,7 +256,9 @@ def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
     try:
         return cls(**_grouped(cls, values))
     except (ValueError, UserError) as error:  # meant for whoever chose the values
-        raise UserError(f"{name}: {one_line(error)}") from error
+        # attrs puts the attribute itself beside what it says of it
+        said = ValueError(error.args[0]) if error.args[1:] and isinstance(error.args[1], Attribute) else error
+        raise UserError(f"{name}: {one_line(said)}") from error
     except Exception as error:
         raise UserError(f"{name}: {failure(error)}") from error
 

@@ -6,7 +6,7 @@ over union on Tsukuba, Venus and Teddy is 0.993, 0.920 and 0.953 for occlusions 
 discontinuities.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +46,23 @@ REGIONS = PAIR_REGIONS | VIEW_REGIONS
 """Name -> what it holds, in one line."""
 
 
+DENSE = 0.5
+"""Share of the known pixels whose right neighbour is known, too, from which truth is dense."""
+
+
+def is_sparse(truth: NDArray[np.float32]) -> bool:
+    """Is truth known at scattered pixels, as of a laser scanner?"""
+    known = np.isfinite(truth)
+    pairs = np.count_nonzero(known[:, 1:] & known[:, :-1])
+    return bool(truth.shape[1] > 1 and pairs < DENSE * np.count_nonzero(known[:, :-1]))
+
+
 def regions(
-    image: NDArray[np.uint8], truth: NDArray[np.float32], partner: float, seen: Mask | None = None
+    image: NDArray[np.uint8],
+    truth: NDArray[np.float32],
+    partner: float,
+    seen: Mask | None = None,
+    sparse: bool = False,
 ) -> Mapping[str, Mask]:
     """All regions of one view.
 
@@ -61,8 +76,10 @@ def regions(
         View steps from this view to the other one of the field's pair; negative if that is to
         the left.
     seen
-        (H, W) bool, whether the partner sees the point, where that is known exactly; by default
-        `points_seen` decides.
+        (H, W) bool, whether the partner sees the point, where that is known; by default `points_seen` decides.
+    sparse
+        Truth is known at scattered pixels only. Then nothing is derived from what lies beside or before a pixel:
+        without `seen`, only ``all`` is known, with it all but ``disc``.
 
     Returns
     -------
@@ -71,15 +88,12 @@ def regions(
     a depth jump or an occlusion, and what lacks texture.
     """
     known = np.isfinite(truth)
+    if sparse and seen is None:
+        return {"all": known}
     nonocc = known & (points_seen(truth, partner) if seen is None else seen)
     occ = known & ~nonocc
-    return {
-        "all": known,
-        "nonocc": nonocc,
-        "occ": occ,
-        "disc": nonocc & near_jumps(truth * np.float32(abs(partner)), occ),
-        "textureless": nonocc & textureless(image),
-    }
+    jumps = {} if sparse else {"disc": nonocc & near_jumps(truth * np.float32(abs(partner)), occ)}
+    return {"all": known, "nonocc": nonocc, "occ": occ, **jumps, "textureless": nonocc & textureless(image)}
 
 
 def counts(pixels: int, known: int) -> bool:
@@ -135,7 +149,13 @@ def points_seen(truth: NDArray[np.float32], steps: float) -> Mask:
     return seen
 
 
-def view_regions(truth: NDArray[np.float32], ref: int, count: int, seen: Mask | None = None) -> Mapping[str, Mask]:
+def view_regions(
+    truth: NDArray[np.float32],
+    ref: int,
+    count: int,
+    seen: Mask | None = None,
+    positions: Sequence[float] | None = None,
+) -> Mapping[str, Mask]:
     """How many of the used views see a pixel's point, and why the others do not.
 
     Every pixel of known truth is in exactly one of the four regions. ``out_of_frame`` is the paper's
@@ -153,6 +173,8 @@ def view_regions(truth: NDArray[np.float32], ref: int, count: int, seen: Mask | 
         (count, H, W) bool, whether each view sees the point, where that is known exactly. By default
         `points_seen` decides. It misses occluded strips narrower than its tolerance, and points of unknown
         truth hide nothing. A point inside a view's frame that the view does not see counts as hidden.
+    positions
+        Where each view was taken, in view steps; by default ``0, 1, 2, ...``.
 
     Returns
     -------
@@ -164,9 +186,10 @@ def view_regions(truth: NDArray[np.float32], ref: int, count: int, seen: Mask | 
     for view in range(count):
         if view == ref:
             continue
-        place = np.floor(columns - (view - ref) * places + 0.5)
+        steps = view - ref if positions is None else positions[view] - positions[ref]
+        place = np.floor(columns - steps * places + 0.5)
         inside = (place >= 0) & (place < truth.shape[1])
-        sees = points_seen(truth, view - ref) if seen is None else seen[view]
+        sees = points_seen(truth, steps) if seen is None else seen[view]
         seen_by += sees
         hidden_from += inside & ~sees
         left += ~inside & ~sees

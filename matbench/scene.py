@@ -1,4 +1,4 @@
-"""A scene: rectified, evenly spaced views and what is known about them."""
+"""A scene: rectified views along a line, and what is known about them."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -12,7 +12,10 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from matbench.errors import UserError
+from matbench.errors import UserError, refuse_hidden
+
+SAME_PLACE = 1e-6
+"""View steps: positions that differ by no more than this are one."""
 
 _ROUNDING = 1e-4  # px of the pair: float32 rounding does not decide what is in the range
 
@@ -51,6 +54,12 @@ class Range:
         return Range(self.least * factor, self.largest * factor)
 
 
+def _uneven(positions: Sequence[float]) -> tuple[float, ...]:
+    """The positions, or none if they are the even ones."""
+    given = tuple(map(float, positions))
+    return () if given == tuple(range(len(given))) else given
+
+
 def _frozen_array(array: NDArray[Any]) -> NDArray[Any]:
     """A read-only, contiguous array; copied only where somebody else could still write to it."""
     own = np.ascontiguousarray(array)
@@ -85,10 +94,11 @@ class HeldOut:
 
 @frozen(eq=False)
 class Scene:
-    """n rectified views taken at even steps along a line, and ground truth for some of them.
+    """n rectified views taken along a line, as a rule at even steps, and ground truth for some of them.
 
     A point of disparity d (pixels per view step) that view `ref` sees at column x is seen by view
-    j at column ``x - (j - ref) * d``, in the same row; nearer points have larger disparities.
+    j at column ``x - (j - ref) * d``, in the same row; nearer points have larger disparities. Where views
+    were taken at uneven steps, ``places[j] - places[ref]`` takes the place of ``j - ref``.
 
     Parameters
     ----------
@@ -115,6 +125,13 @@ class Scene:
         pixel? Only where it is known exactly (synthetic scenes).
     held_out
         A further view that is to be predicted, if that was asked for (`matbench.measures.prediction`).
+    metrics
+        The set of metrics that its benchmark reports (`matbench.measures.benchmarks.SETS`), such as ``hci``; empty
+        if it has none.
+    positions
+        Where each view was taken, in view steps from the first one, if the steps are uneven; else empty.
+    sparse
+        Is truth known at scattered pixels only? Then nothing is derived from what lies beside or before a pixel.
 
     Raises
     ------
@@ -132,8 +149,14 @@ class Scene:
     regions: Mapping[str, NDArray[np.bool_]] = field(converter=_frozen_arrays, factory=dict)
     visible: Mapping[int, NDArray[np.bool_]] = field(converter=_frozen_arrays, factory=dict)
     held_out: HeldOut | None = None
+    metrics: str = ""
+    positions: tuple[float, ...] = field(default=(), converter=_uneven)
+    sparse: bool = False
 
     def __attrs_post_init__(self) -> None:
+        refuse_hidden("scene", self.name)
+        for named in (*self.labels, *self.regions, *([self.held_out.label] if self.held_out else ())):
+            refuse_hidden(f"{self.name}: view or region", named)
         shape = self.views.shape
         if len(shape) != 4 or shape[3] != 3 or self.views.dtype != np.uint8:
             raise SceneError(f"{self.name}: views are {shape} {self.views.dtype}, not (n, H, W, 3) uint8")
@@ -141,6 +164,11 @@ class Scene:
             raise SceneError(f"{self.name}: {shape[0]} views of {shape[2]}x{shape[1]} px; at least two, not empty")
         if len(self.labels) != shape[0]:
             raise SceneError(f"{self.name}: {shape[0]} views but {len(self.labels)} labels")
+        steps = [b - a for a, b in pairwise(self.places)]
+        if len(self.places) != shape[0] or self.places[0] != 0 or not all(0 < step < np.inf for step in steps):
+            raise SceneError(
+                f"{self.name}: views lie at {self.where}: {shape[0]} numbers that begin with 0 and increase are needed"
+            )
         if not 0 <= self.ref < shape[0]:
             raise SceneError(f"{self.name}: reference view {self.ref} is not one of 0..{shape[0] - 1}")
         if not (isfinite(self.pair_steps) and self.pair_steps > 0):
@@ -173,10 +201,35 @@ class Scene:
     def width(self) -> int:
         return int(self.views.shape[2])
 
+    @property
+    def is_even(self) -> bool:
+        """Were the views taken at even steps?"""
+        return not self.positions
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Where each view was taken, in view steps from the first one."""
+        return self.positions or tuple(map(float, range(self.n)))
+
+    @property
+    def where(self) -> str:
+        """Where the views were taken, as messages say it."""
+        return ", ".join(f"{position:g}" for position in self.places)
+
+    def steps(self, view: int) -> float:
+        """View steps from the reference view to a view; negative if that is to the left."""
+        return self.places[view] - self.places[self.ref]
+
+    def at(self, steps: float) -> int | None:
+        """Index of the view that many view steps from the reference view; None if there is none."""
+        found = [view for view in range(self.n) if abs(self.steps(view) - steps) <= SAME_PLACE]
+        return found[0] if found else None
+
     @cached_property
     def digest(self) -> str:
         """SHA-256 of everything a method may see: pixels, order, reference view and range."""
         facts = f"{self.views.shape} {self.labels} {self.ref} {self.disparities} {self.pair_steps!r}"
+        facts += "" if self.is_even else f" {self.positions}"
         return sha256(facts.encode() + self.views.tobytes()).hexdigest()
 
     @cached_property
@@ -192,13 +245,14 @@ class Scene:
     def scored_regions(self) -> Mapping[str, NDArray[np.bool_]]:
         """`regions`, and those over the views that this scene has (`matbench.regions.view_regions`).
 
-        The latter follow a choice of views; without ground truth of the reference view there are none.
+        The latter follow a choice of views. Without ground truth of the reference view, and with sparse one, there
+        are none.
         """
         from matbench.regions import view_regions
 
-        if self.ref not in self.truth:
+        if self.ref not in self.truth or self.sparse:
             return self.regions
-        over_views = view_regions(self.truth[self.ref], self.ref, self.n, self.visible.get(self.ref))
+        over_views = view_regions(self.truth[self.ref], self.ref, self.n, self.visible.get(self.ref), self.places)
         return _frozen_arrays({**self.regions, **over_views})
 
     @property
@@ -217,7 +271,8 @@ class Scene:
         Parameters
         ----------
         indices
-            Views to keep: increasing, evenly spaced, at least two, `ref` among them.
+            Views to keep: increasing, at least two, `ref` among them; of a scene with even steps, evenly spaced. Where
+            those chosen of another one are evenly spaced, their step becomes the view step.
 
         Raises
         ------
@@ -228,13 +283,15 @@ class Scene:
         called = ", ".join(self.labels[i] if 0 <= i < self.n else str(i) for i in kept)
         if len(kept) < 2:
             raise SceneError(f"{self.name}: views {called or 'none'} chosen; at least two are needed")
-        steps = {b - a for a, b in pairwise(kept)}
-        if kept[0] < 0 or kept[-1] >= self.n or len(steps) != 1 or min(steps) < 1:
+        steps = [b - a for a, b in pairwise(kept)]
+        if kept[0] < 0 or kept[-1] >= self.n or min(steps) < 1 or (self.is_even and len(set(steps)) != 1):
             possible = ", ".join(self.labels)
             raise SceneError(f"{self.name}: views {called} are not evenly spaced, left to right; possible: {possible}")
         if self.ref not in kept:
             raise SceneError(f"{self.name}: views {called} lack the reference view {self.labels[self.ref]}")
-        step = steps.pop()
+        apart = [self.places[b] - self.places[a] for a, b in pairwise(kept)]
+        is_even = max(apart) - min(apart) <= SAME_PLACE
+        step = apart[0] if is_even else 1.0
         place = {old: new for new, old in enumerate(kept)}
         return evolve(
             self,
@@ -247,10 +304,11 @@ class Scene:
             pair_steps=self.pair_steps / step,
             visible={place[i]: seen[kept] for i, seen in self.visible.items() if i in place},
             held_out=self.held_out and evolve(self.held_out, steps=self.held_out.steps / step),
+            positions=() if is_even else tuple(self.places[i] - self.places[kept[0]] for i in kept),
         )
 
     def widest(self, count: int) -> tuple[int, ...]:
-        """Indices of at most `count` evenly spaced views around the reference view.
+        """Indices of at most `count` evenly spaced views around the reference view: every k-th one.
 
         The widest spacing that fits wins, then the choice that has the reference view nearest to
         its middle, then the one that reaches further right. On the paper's scenes four views are

@@ -10,6 +10,7 @@ import numpy as np
 from attrs import define, evolve, field, frozen
 from numpy.typing import NDArray
 
+from matbench import drawing
 from matbench.recording.coloring import (
     DISPARITY,
     ERROR,
@@ -78,21 +79,20 @@ class _Sheet:
             self.y += tall + _CAPTION + _GAP
 
     def png(self) -> bytes:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
         height = self.y + _MARGIN - _GAP
         canvas = np.full((height, WIDTH, 3), _BACKGROUND, np.uint8)
         for x, y, picture in self.pictures:
             canvas[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
-        figure = Figure(figsize=(WIDTH / 100, height / 100), dpi=100)
-        FigureCanvasAgg(figure)
-        figure.figimage(canvas, 0, 0)
-        for x, y, words, style in self.texts:
-            looks = {**style, "size": 0.72 * style["size"]}  # px to points at 100 dots an inch
-            figure.text(x / WIDTH, 1 - y / height, words, parse_math=False, va="baseline", **looks)
         out = io.BytesIO()
-        figure.savefig(out, format="png", metadata={"Software": None})
+        with drawing.style():
+            from matplotlib.figure import Figure
+
+            figure = Figure(figsize=(WIDTH / 100, height / 100), dpi=100)
+            figure.figimage(canvas, 0, 0)
+            for x, y, words, style in self.texts:
+                looks = {**style, "size": 0.72 * style["size"]}  # px to points at 100 dots an inch
+                figure.text(x / WIDTH, 1 - y / height, words, parse_math=False, va="baseline", **looks)
+            figure.savefig(out, format="png", metadata={"Software": None})
         return out.getvalue()
 
 

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from matbench.measures.metrics import Better
 from matbench.measures.volumes import StoredVolume
+from matbench.reports.published import Beside
+from matbench.reports.tables import METRIC, THRESHOLD
 from matbench.results.sweeps import Sweep
 from matbench.scene import Scene
-from matbench.spec import Value
+from matbench.typed import Value
 
 Key = tuple[str, str, str, int]
 """Algorithm, parameters, scene and seed: they name a cell."""
@@ -54,6 +56,8 @@ class Report:
         The curves of options that took several numbers.
     reliability
         Reliability curves of the volumes that were kept (`matbench.results.scores.reliabilities`).
+    sparsification
+        Curves of risk over coverage of the confidence maps (`matbench.results.scores.Tables`).
     better
         Metric -> which direction is better; of all others, less is.
     volumes
@@ -66,6 +70,12 @@ class Report:
         Algorithm -> parameter -> the group that it is shown in, where it has one.
     rows
         The image rows of the epipolar slices; empty if none were asked for.
+    beside
+        Scores as published, beside the measured ones, if that was asked for.
+    metric
+        What methods are ranked by until a reader chooses another one.
+    decision
+        How a run ended that grew until a difference was decided; empty for others.
     """
 
     title: str
@@ -78,12 +88,22 @@ class Report:
     ablation: pd.DataFrame | None = None
     sweeps: tuple[Sweep, ...] = ()
     reliability: pd.DataFrame | None = None
+    sparsification: pd.DataFrame | None = None
     better: Mapping[str, Better] = field(factory=dict)
     volumes: Volumes = _no_volume
     histories: Mapping[Key, History] = field(factory=dict)
     parameters: Mapping[tuple[str, str], Mapping[str, Value]] = field(factory=dict)
     groups: Mapping[str, Mapping[str, str]] = field(factory=dict)
     rows: Sequence[int] = ()
+    beside: Beside | None = None
+    decision: str = ""
+    metric: str = METRIC
+
+    @property
+    def wrong(self) -> float:
+        """Px of the pair: an answer with a larger error is wrong in the figures. The threshold in `metric`, or 1."""
+        found = THRESHOLD.fullmatch(self.metric)
+        return float(found[2]) if found else 1.0
 
     def disparity(self, algorithm: str, params: str, scene: str, seed: int) -> NDArray[np.float32] | None:
         """(H, W) disparity map of a cell, or None; also None where its size is not the scene's."""

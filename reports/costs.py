@@ -35,7 +35,7 @@ def _places(cells: pd.DataFrame) -> pd.Series:
 def disturbed(cells: pd.DataFrame) -> pd.Series:
     """A mask of the cells whose seconds are in doubt: other cells ran meanwhile, or others took the processors."""
     company = cells.get("alone", pd.Series(True, cells.index)).astype(str) == "False"
-    doubt = cells.get("doubt", pd.Series("", cells.index)).fillna("").astype(str) != ""
+    doubt = cells.get("doubt", pd.Series("", cells.index)).astype(object).fillna("").astype(str) != ""
     return company | doubt
 
 
@@ -47,7 +47,8 @@ def timing_note(cells: pd.DataFrame) -> str:
         return ""
     return (
         f"{CLOCK} time: {alike} of {ok} cells can be compared; the others ran on another machine, beside other cells, "
-        "or while other programs took the processors. Methods with such cells (*) are not ranked by it"
+        "while other programs took the processors, or not at all "
+        "(ready-made answers). Methods with such cells (*) are not ranked by it"
     )
 
 
@@ -88,9 +89,12 @@ def seconds(cells: pd.DataFrame, scope: "Shared") -> pd.DataFrame:
     return pd.DataFrame.from_dict(out, orient="index", columns=["seconds", "least", "most", "alike"])
 
 
-def memory(cells: pd.DataFrame, scope: "Shared") -> pd.Series:
-    """Method -> peak memory of the scene that took most, of those that count: what a machine must have."""
+def memory(cells: pd.DataFrame, scope: "Shared", column: str = "peak_mb") -> pd.Series:
+    """Method -> peak memory of the scene that took most, of those that count: what a machine must have.
+
+    Other columns of the cells are taken in the same way.
+    """
     good = cells[cells["status"] == "ok"]
-    table = good.assign(peak=good["peak_mb"].astype(float)).groupby(["scene", "method"])["peak"].max().unstack("method")
+    table = good.assign(peak=good[column].astype(float)).groupby(["scene", "method"])["peak"].max().unstack("method")
     wide = table.reindex(index=list(scope.asked), columns=list(scope.methods))
     return pd.Series({m: wide.loc[list(scope.counted(m)), m].max(skipna=False) for m in scope.methods}, dtype=float)

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from matbench.measures.statistics import FEW
 from matbench.reports.page_figures import ACROSS, INK, dress, grid_of, line_style, name_curves
+from matbench.reports.standing import verdict
 from matbench.reports.tables import ASIDE, METRIC, aside_note, interval, label, metrics, regions
 from matbench.reports.tables import text as shown
 from matbench.results.comparable import is_enough
@@ -51,7 +52,10 @@ def caption(sweep: Sweep, metric: str = METRIC) -> str:
     elif count < FEW:
         said.append(f"{'They are' if count > 1 else 'It is'} too few scenes for a band or a conclusion.")
     else:
-        said.append("Bands and intervals: 95 % bootstrap over scenes; changes are paired by scene.")
+        said.append(
+            "Bands and intervals: 95 % over scenes; changes are paired by scene, "
+            "and verdicts corrected for all changes of a region (Holm)."
+        )
     if sweep.left_out:
         said.append(f"Left out for want of a result: {', '.join(sweep.left_out)}.")
     moving = [region for region in sweep.moving if region in set(sweep.curves["region"])]
@@ -91,7 +95,7 @@ def lines(sweep: Sweep, metric: str = METRIC) -> pd.DataFrame:
                 }
                 | {"change": shown(last["change"], "%", signed=True)}
                 | {"interval": interval(last["change_low"], last["change_high"]), "scenes": str(last["scenes"])}
-                | {"verdict": str(last["verdict"])}
+                | {"verdict": verdict(str(last["verdict"]), last["enough"])}
             )
     heads = ["region", "method", *(f"{v:g}" for v in sweep.values), "change", "interval", "scenes", "verdict"]
     return pd.DataFrame(out, columns=heads)

@@ -17,9 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 THRESHOLDS = np.arange(0, 8.01, 0.25)
-"""Px of the pair."""
+"""Times the error above which an answer is wrong (`Report.wrong`)."""
 
-WRONG = 1.0  # px of the pair: as in total_bad_1
 LEAST_PIXELS = 50  # a share of fewer pixels is mostly chance
 
 Counts = NDArray[np.intp]
@@ -35,7 +34,7 @@ def views_seeing(scene: Scene) -> Counts | None:
         return None
     exact = scene.visible.get(scene.ref)
     others = [view for view in range(scene.n) if view != scene.ref]
-    seen = [points_seen(truth, view - scene.ref) if exact is None else exact[view] for view in others]
+    seen = [points_seen(truth, scene.steps(view)) if exact is None else exact[view] for view in others]
     count: Counts = np.where(np.isfinite(truth), 1 + np.sum(seen, axis=0), 0)
     return count
 
@@ -49,23 +48,28 @@ class Spread:
     above
         Region -> (thresholds,) per cent of its pixels without an answer or with an error above each threshold.
     by_views
-        Number of views that see a pixel -> per cent of these pixels without an answer or with an error above `WRONG`.
+        Number of views that see a pixel -> per cent of these pixels without an answer or with an error above `wrong`.
     views
         How many views the scene has.
+    wrong
+        Px of the pair above which an error makes an answer wrong.
     """
 
     above: Mapping[str, NDArray[np.float64]]
     by_views: Mapping[int, float]
     views: int
+    wrong: float = 1.0
 
 
-def spread(estimate: NDArray[np.float32], scene: Scene, seeing: Counts) -> Spread:
+def spread(estimate: NDArray[np.float32], scene: Scene, seeing: Counts, wrong: float = 1.0) -> Spread:
     """Measure one map of the reference view, (H, W) in pixels per view step.
 
     Parameters
     ----------
     seeing
         The result of `views_seeing`.
+    wrong
+        Px of the pair above which an error makes an answer wrong; thresholds are multiples of it.
     """
     truth = scene.truth[scene.ref]
     error = np.nan_to_num(error_map(estimate, truth, scene.pair_steps), nan=np.inf)
@@ -73,11 +77,11 @@ def spread(estimate: NDArray[np.float32], scene: Scene, seeing: Counts) -> Sprea
     for region, mask in scene.scored_regions.items():
         errors = np.sort(error[mask & known])
         if errors.size:
-            above[region] = 100 * (1 - np.searchsorted(errors, THRESHOLDS + TIE, side="right") / errors.size)
+            above[region] = 100 * (1 - np.searchsorted(errors, THRESHOLDS * wrong + TIE, side="right") / errors.size)
     pixels = np.bincount(seeing[known], minlength=scene.n + 1)
-    wrong = np.bincount(seeing[known & (error > WRONG + TIE)], minlength=scene.n + 1)
-    by_views = {k: float(100 * wrong[k] / pixels[k]) for k in range(1, scene.n + 1) if pixels[k] >= LEAST_PIXELS}
-    return Spread(above, by_views, scene.n)
+    missed = np.bincount(seeing[known & (error > wrong + TIE)], minlength=scene.n + 1)
+    by_views = {k: float(100 * missed[k] / pixels[k]) for k in range(1, scene.n + 1) if pixels[k] >= LEAST_PIXELS}
+    return Spread(above, by_views, scene.n, wrong)
 
 
 Spreads = Mapping[tuple[str, str], Spread]
@@ -96,13 +100,13 @@ def thresholds(spreads: Spreads, scope: Shared) -> "Figure | None":
             here = [spreads[method, s] for s in scope.scenes if (method, s) in spreads]
             parts = [part.above[region] for part in here if region in part.above]
             if parts:
-                curves[method] = (THRESHOLDS, np.mean(parts, axis=0))
+                curves[method] = (THRESHOLDS * here[0].wrong, np.mean(parts, axis=0))
         panels.append((region, curves))
     return page_figures.panels(panels, "threshold, px of the pair", "pixels above it, %", every=6)
 
 
 def by_views(spreads: Spreads, scope: Shared) -> "tuple[Figure | None, list[str]]":
-    """total_bad_1 against how many views see a pixel, a panel for each number of views in a scene; and warnings."""
+    """Wrong answers against how many views see a pixel, a panel for each number of views in a scene; and warnings."""
     methods = [m for m in scope.methods if scope.is_ranked(m)]
     shared = {s: part for (_, s), part in spreads.items() if s in scope.scenes}
     panels, said = [], []
@@ -118,4 +122,5 @@ def by_views(spreads: Spreads, scope: Shared) -> "tuple[Figure | None, list[str]
         panels.append((f"{count} views, {len(scenes)} scene{'s' if len(scenes) != 1 else ''}", curves))
         partly = [k for k in places if sum(k in shared[s].by_views for s in scenes) < len(scenes)]
         said += [f"{count} views: not every scene has pixels seen by {', '.join(map(str, partly))}."] if partly else []
-    return page_figures.panels(panels, "views that see the pixel", "total_bad_1, %", backwards=True), said
+    wrong = next((part.wrong for part in shared.values()), 1.0)
+    return page_figures.panels(panels, "views that see the pixel", f"total_bad_{wrong:g}, %", backwards=True), said

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from matbench.errors import UserError, failure
 from matbench.measures.metrics import Metric, map_in_region
 from matbench.recording import coloring
-from matbench.reports.page_figures import printable
+from matbench.reports.page_figures import shortened
 from matbench.reports.paper_figure import INCHES, TALLEST, CaptionedFigure, Width, letter, small_print
 from matbench.scene import Scene
 from matbench.spec import read_scene
@@ -53,8 +53,6 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False, metric: Metr
     UserError
         If it does not fit on a page.
     """
-    from matplotlib.figure import Figure
-
     inches = INCHES[width]
     lines = [maps.scenes[i : i + ABREAST[width]] for i in range(0, len(maps.scenes), ABREAST[width])]
     pictures = Pictures.of(maps, metric)
@@ -72,6 +70,8 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False, metric: Metr
     tall = sum(len(rows) * (height + 0.03) + 0.24 for height in heights)
     margin = (inches - across * side) / 2 + 0.08
     with small_print():
+        from matplotlib.figure import Figure
+
         figure = Figure(figsize=(inches, tall))
         below = tall
         for line, height in zip(lines, heights, strict=True):
@@ -82,7 +82,7 @@ def draw(maps: Maps, width: Width = "column", errors: bool = False, metric: Metr
                     box = (margin + at * side + 0.01, bottom, side - 0.02, height)
                     axis = figure.add_axes((box[0] / inches, box[1] / tall, box[2] / inches, box[3] / tall))
                     _draw(axis, maps, scene, kind, method, pictures)
-                name = printable(titles[scene.name], round(17 * side))
+                name = shortened(titles[scene.name], round(17 * side))
                 figure.text(
                     (margin + (at + 0.5) * side) / inches, (below + 0.05) / tall, name, ha="center", parse_math=False
                 )

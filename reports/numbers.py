@@ -1,6 +1,5 @@
 """All numbers that a reader of the page can choose: the usual tables, for every metric and region."""
 
-import re
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -14,18 +13,24 @@ from matbench.measures.statistics import Effect
 from matbench.reports import costs, standing, tables
 from matbench.reports.content import Report
 from matbench.reports.standing import Difference
-from matbench.reports.tables import EFFECT, METRIC, NOT_RANKED, REGION, Shared, interval, text
+from matbench.reports.tables import EFFECT, METRIC, NOT_RANKED, REGION, THRESHOLD, Shared, interval, text
 from matbench.results.comparable import SILENT
-
-THRESHOLD = re.compile(r"(bad|total_bad)_(\d+(?:\.\d+)?)")
-"""Metrics that have a threshold in their name."""
+from matbench.runs.outcome import DEVICE
 
 AT = "@"  # stands for the threshold in a family's name
 
 _FIRST = ("total_bad_@", "bad_@", "invalid", "avg", "rms")
 
-COSTS = {"seconds": ("s", f"{costs.CLOCK} time"), "peak_mb": ("MiB", "memory")}
+COSTS = {
+    "seconds": ("s", f"{costs.CLOCK} time"),
+    "peak_mb": ("MiB", "memory"),
+    "device_seconds": ("s", "most device time as told"),
+    "device_mb": ("MiB", "device memory as told"),
+}
 """Column of the cells -> unit, and what it is called."""
+
+SHOWN = 600
+"""The most cells whose scores and maps are shown one by one: each takes some kilobytes of the page."""
 
 Entry = list[Any]
 """[number or None, as shown, place, what is said beside it]: a cell of a table, in the template and in the script.
@@ -59,7 +64,10 @@ class Numbers:
     @property
     def metric(self) -> str:
         """The metric that is shown first."""
-        return METRIC if METRIC in self.units or not self.units else next(iter(self.units))
+        for name in (self.report.metric, METRIC):
+            if name in self.units or not self.units:
+                return name
+        return next(iter(self.units))
 
     @property
     def region(self) -> str:
@@ -163,18 +171,36 @@ class Numbers:
 
         return self._by_metric(make)
 
+    def ranking(self, metric: str, region: str) -> standing.Ranking | None:
+        """The mean ranks with their critical difference."""
+        table, aside = self._tables[metric, region], self.aside[metric][region]
+        return standing.ranking(table, self.scope, self.units[metric], self.better(metric), aside)
+
+    @cached_property
+    def shown(self) -> tuple[str, ...]:
+        """The scenes that are shown one by one: all, or as many as `SHOWN` allows, evenly from the easiest on.
+
+        How easy a scene is tells the mean of the first metric over all methods.
+        """
+        asked, most = self.scope.asked, max(1, SHOWN // max(1, len(self.scope.methods)))
+        if len(asked) <= most:
+            return asked
+        means = tables.merit(self._tables[self.metric, self.region], self.better(self.metric)).mean(axis=1)
+        order = means.fillna(np.inf).sort_values(kind="stable").index
+        chosen = {str(order[place]) for place in np.linspace(0, len(order) - 1, most).round().astype(int)}
+        return tuple(scene for scene in asked if scene in chosen)
+
     @cached_property
     def scenes(self) -> dict[str, dict[str, list[list[Entry]]]]:
-        """Metric -> region -> scenes x methods of entries; the status stands where a cell did not end well."""
+        """Metric -> region -> `shown` x methods of entries; the status stands where a cell did not end well."""
         bad = self.report.cells[self.report.cells["status"] != "ok"]
         status = {(m, s): state for m, s, state in zip(bad["method"], bad["scene"], bad["status"], strict=True)}
-        has = {
-            s: pd.Series({m: s in self.scope.has[m] for m in self.scope.methods}, dtype=bool) for s in self.scope.asked
-        }
+        has = {s: pd.Series({m: s in self.scope.has[m] for m in self.scope.methods}, dtype=bool) for s in self.shown}
 
         def make(metric: str, table: pd.DataFrame, answered: pd.DataFrame) -> list[list[Entry]]:
             out = []
-            for (scene, row), (_, over) in zip(table.iterrows(), answered.iterrows(), strict=True):
+            rows = (part.loc[list(self.shown)].iterrows() for part in (table, answered))
+            for (scene, row), (_, over) in zip(*rows, strict=True):
                 here = has[str(scene)]
                 unit, better = self.units[metric], self.better(metric)
                 found = entries(row.where(here), here, unit, better, over.where(here))
@@ -208,6 +234,10 @@ class Numbers:
         if "peak_mb" in self.report.cells:
             memory = costs.memory(self.report.cells, self.scope)
             found["peak_mb"] = entries(memory, self._ranked, "MiB")
+        for name in DEVICE:  # methods say it of themselves: it is shown, not ranked
+            if name in self.report.cells and self.report.cells[name].notna().any():
+                most = costs.memory(self.report.cells, self.scope, name)
+                found[name] = entries(most, self._ranked & False, COSTS[name][0])
         return found
 
     @cached_property
@@ -228,8 +258,7 @@ class Numbers:
         if reference is None:
             values = {m: means[m][0] for m in known if means[m][0] is not None and m not in aside}
             reference = min(values, key=lambda m: tables.merit(values[m], self.better(metric)), default=None)
-        effects = {d.method: d.effect for d in found if d.reference == reference}
-        effects |= {d.reference: turned(d.effect) for d in found if d.method == reference}
+        effects = standing.against(found, reference, self.scope) if reference is not None else {}
         parts = [v for effect in effects.values() for v in _ends(effect)]
         left, right = min(0.0, *parts, 0.0), max(0.0, *parts, 0.0)
         width = right - left or 1.0
@@ -243,10 +272,10 @@ class Numbers:
                 "scenes": effect.scenes,
                 "verdict": SILENT
                 if {method, reference} & set(aside)
-                else words(effect.verdict, self.better(metric) == "higher"),
+                else standing.words(standing.told(effect), self.better(metric) == "higher"),
                 "bar": [round(3 + 94 * (v - left) / width, 2) for v in (*_ends(effect), 0.0)],
             }
-            for method, effect in ((m, effects[m]) for m in self.scope.methods if m in effects)
+            for method, effect in effects.items()
         ]
 
     def data(self) -> dict[str, Any]:
@@ -254,7 +283,7 @@ class Numbers:
         place = {m: i for i, m in enumerate(self.scope.methods)}
         return {
             "methods": list(self.scope.methods),
-            "asked": list(self.scope.asked),
+            "asked": list(self.shown),
             "regions": self.regions,
             "units": self.units,
             "better": {m: self.better(m) for m in self.units},
@@ -285,40 +314,32 @@ def entries(
     answered
         Method -> per cent of the pixels that its value is over: it is told, and who has too little gets no place.
     """
-    over = pd.Series(np.nan, values.index) if answered is None else answered.reindex(values.index)
-    aside = tables.too_silent(over)
-    marks = tables.places(values[ranked & ~values.index.isin(list(aside))], unit, better)
+    # with plain numbers: a page asks for thousands of entries, and pandas takes a millisecond for each
+    names, numbers = [str(method) for method in values.index], values.to_numpy(float).tolist()
+    over = dict.fromkeys(names, float("nan"))
+    if answered is not None:
+        given = dict(zip(map(str, answered.index), answered.to_numpy(float).tolist(), strict=True))
+        over = {name: given.get(name, float("nan")) for name in names}
+    aside = tables.silent_ones(over)
+    is_ranked = dict(zip(map(str, ranked.index), ranked.tolist(), strict=True))
+    placed = [name for name in names if is_ranked[name] and name not in aside]
+    shown = dict(zip(names, (text(value, unit) for value in numbers), strict=True))
+    marks = tables.places_of({name: shown[name] for name in placed}, better)
     out: dict[str, Entry] = {}
-    for method, value in values.items():
-        out[str(method)] = [_sortable(value), text(value, unit), int(marks.get(method, 0))]
-        if (answers := float(over[str(method)])) < 100 and pd.notna(value):
+    for name, value in zip(names, numbers, strict=True):
+        out[name] = [_sortable(value), shown[name], marks.get(name, 0)]
+        if (answers := over[name]) < 100 and value == value:
             said = f"{tables.share(answers)} answered"
-            out[str(method)].append(f"{said}, not ranked" if method in aside else said)
-            out[str(method)][2] = NOT_RANKED if method in aside else out[str(method)][2]
+            out[name].append(f"{said}, not ranked" if name in aside else said)
+            out[name][2] = NOT_RANKED if name in aside else out[name][2]
     return out
 
 
 def _sortable(value: float) -> float | None:
     """A number that JSON can hold; the largest one for infinity, None where there is none."""
-    if pd.isna(value):
+    if value != value:
         return None
-    return float(f"{np.clip(value, -1e300, 1e300):.8g}")
-
-
-def words(verdict: str, higher: bool) -> str:
-    """A verdict in words: better or worse.
-
-    >>> words("lower", higher=False), words("lower", higher=True), words("undecided", higher=True)
-    ('better', 'worse', 'undecided')
-    """
-    if verdict not in ("lower", "higher"):
-        return verdict
-    return "better" if (verdict == "higher") == higher else "worse"
-
-
-def turned(effect: Effect) -> Effect:
-    """The effect of the opposite difference: b - a for a - b."""
-    return Effect(-effect.mean, -effect.high, -effect.low, -effect.size, effect.scenes)
+    return float(f"{min(max(value, -1e300), 1e300):.8g}")
 
 
 def _ends(effect: Effect) -> tuple[float, float, float]:
@@ -328,8 +349,8 @@ def _ends(effect: Effect) -> tuple[float, float, float]:
 
 
 def _numbers(effect: Effect) -> list[float | int | str | None]:
-    """Mean, low and high, the scenes; then mean, low, high and size as shown: a browser would round once more."""
+    """Mean, low and high, the scenes; then mean, low, high, size and verdict as shown: a browser would round again."""
     found = (effect.mean, effect.low, effect.high)
     shown = (text(v, "%", signed=True) for v in found)
     numbers = (float(f"{v:.4g}") if np.isfinite(v) else None for v in found)
-    return [*numbers, effect.scenes, *shown, text(effect.size, EFFECT, signed=True)]
+    return [*numbers, effect.scenes, *shown, text(effect.size, EFFECT, signed=True), standing.told(effect)]

@@ -1,5 +1,6 @@
 """The report page of a run: one HTML file that opens anywhere, without a network."""
 
+import json
 import re
 from base64 import b64encode
 from collections.abc import Mapping
@@ -18,16 +19,32 @@ from matbench.measures.metrics import ENOUGH
 from matbench.measures.statistics import FEW
 from matbench.recording import coloring
 from matbench.regions import LEAST_PIXELS, LEAST_SHARE, REGIONS
-from matbench.reports import costs, curves, error_spread, page_figures, passes, switches, tables
+from matbench.reports import (
+    confidence_figure,
+    costs,
+    curves,
+    error_spread,
+    page_figures,
+    passes,
+    rank_figure,
+    standing,
+    switches,
+    tables,
+)
 from matbench.reports.content import Report
 from matbench.reports.numbers import COSTS, Numbers
-from matbench.reports.pictures import gallery
+from matbench.reports.pictures import MOST, gallery
 from matbench.reports.tables import METRIC, REGION, Shared
-from matbench.spec import Value
+from matbench.safe_text import printable
+from matbench.typed import Value
 
 __all__ = ["Report", "render", "write_page"]
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+MOST_PAGE = 14_500_000
+"""The most characters of a page, about: what is not pictures is measured first."""
 
 
 def write_page(path: Path, report: Report) -> None:
@@ -37,19 +54,28 @@ def write_page(path: Path, report: Report) -> None:
 
 def render(report: Report) -> str:
     """The page of a run as HTML."""
+    with page_figures.page_look():
+        return _render(report)
+
+
+def _render(report: Report) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     report = evolve(report, results=tables.labelled(report.results), cells=tables.labelled(report.cells))
-    rows = tables.summary(report.results, report.cells)
+    first = _first_metric(report)
+    rows = tables.summary(report.results, report.cells, first, report.better.get(first, "lower"))
     # methods stand in the same order everywhere on the page: best first
     scope = evolve(tables.shared(report.results, report.cells), methods=tuple(str(m) for m in rows.index))
-    numbers = Numbers(report, scope)
-    shown = gallery(report, scope)
+    numbers = Numbers(evolve(report, metric=first), scope)
+    pictured = evolve(scope, asked=numbers.shown)
+    chosen = numbers.data()
+    shown = gallery(report, pictured, most=min(MOST, MOST_PAGE - len(json.dumps(chosen))))
     template = files("matbench.reports") / "templates"
     script = (template / "report.js").read_text(encoding="utf-8")
     environment = Environment(
         loader=PackageLoader("matbench.reports", "templates"),
         autoescape=True,
+        finalize=_inert,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -62,10 +88,15 @@ def render(report: Report) -> str:
         scope=scope,
         numbers=numbers,
         few=FEW,
+        correction=standing.correction(sum(scope.is_ranked(m) for m in scope.methods)),
+        ranks=_ranks(numbers),
         style=(template / "report.css").read_text(encoding="utf-8"),
         script=script,
         script_hash=b64encode(sha256(script.encode()).digest()).decode("ascii"),
-        answer=_answer(rows, scope, numbers),
+        answer=_answer(rows, scope, numbers, first),
+        first=first,
+        first_unit=numbers.units.get(first, "%"),
+        unit=f"\N{NO-BREAK SPACE}{unit}" if (unit := numbers.units.get(first, "%")) else "",
         counts=report.cells["status"].value_counts().to_dict(),
         table=_table(numbers, rows),
         table_counts=[numbers.counts[numbers.metric][numbers.region], *map(numbers.count, numbers.columns)]
@@ -87,11 +118,12 @@ def render(report: Report) -> str:
         by_views=_svg(by_views),
         by_views_notes=by_views_notes,
         reliability=_svg(page_figures.reliability(report.reliability)),
-        cost_figures=_cost_figures(numbers, rows),
+        **_confidence(report, scope),
+        cost_figures=_cost_figures(numbers, rows, first),
         thresholds=_svg(error_spread.thresholds(shown.spreads, scope)),
-        curves=_curves(report),
-        switches=[] if report.ablation is None else switches.lines(report.ablation).values.tolist(),
-        forest=None if report.ablation is None else _svg(switches.forest(report.ablation)),
+        curves=_curves(report, first),
+        switches=[] if report.ablation is None else switches.lines(report.ablation, first).values.tolist(),
+        forest=None if report.ablation is None else _svg(switches.forest(report.ablation, first)),
         bad=_records(report.cells[report.cells["status"] != "ok"], ("method", "scene", "seed", "status", "reason")),
         methods=_methods(report),
         disparity_bar=page_figures.gradient(coloring.DISPARITY),
@@ -99,8 +131,7 @@ def render(report: Report) -> str:
         difference_bar=page_figures.gradient(coloring.DIFFERENCE),
         error_limit=coloring.WORST,
         data={
-            **numbers.data(),
-            "few": FEW,
+            **chosen,
             "worst": coloring.WORST,
             "unknown": coloring.UNKNOWN,
             "stripes": coloring.STRIPES,
@@ -115,9 +146,30 @@ def render(report: Report) -> str:
     )
 
 
+def _confidence(report: Report, scope: Shared) -> dict[str, Any]:
+    """The figure of risk over coverage, the table beside it, and its head."""
+    points = report.sparsification
+    found, about = {}, ""
+    if points is not None and not points.empty:
+        points = confidence_figure.comparable(points, scope)
+        found = confidence_figure.curves(points, scope.methods)
+        about = confidence_figure.caption(*confidence_figure.scenes_of(points, found)) if found else ""
+    return {
+        "risks": _svg(confidence_figure.figure(found, page_figures.INK)),
+        "sureness": confidence_figure.lines(report.results, scope) if found else [],
+        "sureness_head": confidence_figure.COLUMNS,
+        "risks_about": about,
+    }
+
+
+def _inert(value: Any) -> Any:
+    """What a template shows, printable: a mark of writing direction would make a text look like another one."""
+    return printable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
 def _breakable(name: str) -> Markup:
     """A name, escaped, in which a browser may break the line after punctuation."""
-    return Markup("<wbr>").join(escape(part) for part in re.split(r"(?<=[_\[=/,])", name))
+    return Markup("<wbr>").join(escape(part) for part in re.split(r"(?<=[_\[=/,])", printable(name)))
 
 
 def _hex(name: str) -> str:
@@ -125,26 +177,50 @@ def _hex(name: str) -> str:
     return coloring.palette(name).tobytes().hex()
 
 
-def _answer(rows: pd.DataFrame, scope: Shared, numbers: Numbers) -> dict[str, Any]:
-    """The facts of the first sentence: which method is best by total_bad_1 in `all`, and how sure that is."""
-    scores = rows.loc[rows["ranked"], f"{METRIC} {REGION}"].dropna()
-    shown = {str(m): tables.text(v, "%") for m, v in scores.items()}
+def _first_metric(report: Report) -> str:
+    """What methods are ranked by: what the report says, if it was measured."""
+    return report.metric if (report.results["metric"] == report.metric).any() else METRIC
+
+
+def _answer(rows: pd.DataFrame, scope: Shared, numbers: Numbers, metric: str) -> dict[str, Any]:
+    """The facts of the first sentence: which method is best by a metric in `all`, and how sure that is."""
+    scores = rows.loc[rows["ranked"], f"{metric} {REGION}"].dropna()
+    unit = numbers.units.get(metric, "%")
+    shown = {str(m): tables.text(v, unit) for m, v in scores.items()}
     best = [m for m in shown if shown[m] == next(iter(shown.values()))]
     rest = [m for m in shown if m not in best]
-    lines = numbers.against(METRIC, REGION, best[0]) if rest else []
+    lines = numbers.against(metric, REGION, best[0]) if rest else []
     verdicts = {line["method"]: line["verdict"] for line in lines}
     return {
         "best": best,
         "score": shown[best[0]] if best else "",
         "next": rest[0] if rest else None,
         "next_score": shown[rest[0]] if rest else "",
-        "undecided": bool(rest) and verdicts.get(rest[0]) == "undecided",
+        "undecided": bool(rest) and verdicts.get(rest[0], "").startswith("undecided"),
+        "enough": _enough(verdicts.get(rest[0], "")) if rest else "",
         "compared": len(shown),
         "scenes": len(scope.scenes),
         "distinct": scope.distinct,
         "few": scope.distinct < FEW,
         "unranked": [str(m) for m in rows.index[~rows["ranked"]]],
     }
+
+
+def _enough(verdict: str) -> str:
+    """How many scenes would decide, in brackets, where a verdict says so."""
+    said = verdict.partition(": ")[2]
+    return f" ({said})" if said else ""
+
+
+def _ranks(numbers: Numbers) -> tuple[str, str] | None:
+    """The critical-difference diagram of the metric and region that are shown first, and its caption."""
+    if not numbers.units:
+        return None
+    found = numbers.ranking(numbers.metric, numbers.region)
+    if found is None:
+        return None
+    figure = rank_figure.figure(found, page_figures.INK)
+    return page_figures.svg(figure), rank_figure.caption(found, numbers.metric, numbers.region)
 
 
 def _table(numbers: Numbers, rows: pd.DataFrame) -> list[dict[str, Any]]:
@@ -167,12 +243,15 @@ def _table(numbers: Numbers, rows: pd.DataFrame) -> list[dict[str, Any]]:
     ]
 
 
-def _cost_figures(numbers: Numbers, rows: pd.DataFrame) -> list[str]:
+def _cost_figures(numbers: Numbers, rows: pd.DataFrame, metric: str) -> list[str]:
     """Accuracy against seconds, and against memory."""
     memory = {m: entry[0] for m, entry in numbers.costs.get("peak_mb", {}).items()}
     known = rows.assign(memory=pd.Series(memory, dtype=float).reindex(rows.index))
     known["seconds"] = known["seconds"].where(known["alike"])
-    drawn = (page_figures.cost(known, f"{METRIC} {REGION}", "%", against) for against in page_figures.COSTS)
+    drawn = (
+        page_figures.cost(known, f"{metric} {REGION}", numbers.units.get(metric, "%"), against)
+        for against in page_figures.COSTS
+    )
     return [page_figures.svg(figure) for figure in drawn if figure is not None]
 
 
@@ -180,15 +259,15 @@ def _svg(figure: "Figure | None") -> str | None:
     return None if figure is None else page_figures.svg(figure)
 
 
-def _curves(report: Report) -> list[dict[str, Any]]:
+def _curves(report: Report, metric: str) -> list[dict[str, Any]]:
     """For each sweep its title, caption, figure and table."""
     return [
         {
             "title": curves.title(sweep),
-            "caption": curves.caption(sweep),
-            "figure": _svg(curves.figure(sweep)),
+            "caption": curves.caption(sweep, metric),
+            "figure": _svg(curves.figure(sweep, metric)),
             "heads": [f"{value:g}" for value in sweep.values],
-            "lines": curves.lines(sweep).values.tolist(),
+            "lines": curves.lines(sweep, metric).values.tolist(),
         }
         for sweep in report.sweeps
     ]

@@ -3,14 +3,17 @@
 import io
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from matbench import drawing
 from matbench.recording.coloring import palette
 from matbench.reports.tables import label
+from matbench.safe_text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,14 +28,19 @@ _POINTS = ("o", "s", "^", "D", "v", "P", "X")
 _LINES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 
 
+def page_look() -> AbstractContextManager[None]:
+    """A context in which the page's figures are drawn and saved."""
+    return drawing.style({"svg.fonttype": "none", "svg.hashsalt": "matbench"})
+
+
 def gradient(name: str, stops: int = 17) -> str:
     """A colour map as the stops of a CSS gradient."""
     return ", ".join("#{:02x}{:02x}{:02x}".format(*map(int, c)) for c in palette(name, stops))
 
 
-def printable(name: str, longest: int = 44) -> str:
-    """A name shortened to `longest` characters, without control characters."""
-    name = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in name)
+def shortened(name: str, longest: int = 44) -> str:
+    """A name shortened to `longest` characters, hidden ones as escapes."""
+    name = printable(name)
     return name if len(name) <= longest else name[: longest // 2] + "…" + name[1 - longest // 2 :]
 
 
@@ -76,7 +84,7 @@ def name_curves(figure: "Figure", methods: Sequence[str]) -> None:
     """Write a legend with the methods' names below all panels."""
     from matplotlib.lines import Line2D
 
-    names = [printable(method) for method in methods]
+    names = [shortened(method) for method in methods]
     longest = max(map(len, names), default=0)
     columns = max(1, min(4, len(names), 100 // (longest + 8)))
     handles = [Line2D([], [], **line_style(i)) for i in range(len(names))]
@@ -197,7 +205,7 @@ def cost(rows: pd.DataFrame, score: str, unit: str, against: str = "seconds") ->
         Its column for the horizontal axis, one of `COSTS`.
     """
     ranked = rows[rows["ranked"]].dropna(subset=[score, against])
-    points = [(max(float(r[against]), 1e-4), float(r[score]), printable(str(m))) for m, r in ranked.iterrows()]
+    points = [(max(float(r[against]), 1e-4), float(r[score]), shortened(str(m))) for m, r in ranked.iterrows()]
     if not points:
         return None
     from matplotlib.figure import Figure
@@ -244,7 +252,7 @@ def reliability(curves: pd.DataFrame | None) -> "Figure | None":
         sums = pd.DataFrame({name: rows[name] * points for name in ("materiality", "observed")}).assign(points=points)
         pooled = sums.groupby(place).sum()
         x, y = (pooled[name] / pooled["points"] for name in ("materiality", "observed"))
-        name = printable(label(str(algorithm), str(params)))
+        name = shortened(label(str(algorithm), str(params)))
         axes.plot(x, y, label=name, **line_style(number))
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
     axes.set_xlabel("materiality", color=INK)
@@ -259,11 +267,9 @@ def reliability(curves: pd.DataFrame | None) -> "Figure | None":
 
 def svg(figure: "Figure") -> str:
     """A figure as an ``<svg>`` element for the page: in its colour and font, and without any address."""
-    from matplotlib import rc_context
-
     out = io.StringIO()
     metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "matbench"}):
+    with page_look():
         figure.savefig(out, format="svg", transparent=True, metadata=metadata)
     text = out.getvalue()
     text = text[text.index("<svg") :].replace(INK, "currentColor")

@@ -57,7 +57,7 @@ def similarity(scene: Scene, row: int) -> PageSlice:
     total, pairs = np.zeros((count, scene.width)), np.zeros((count, scene.width))
     before: tuple[NDArray[Any], NDArray[Any]] | None = None
     for view in range(scene.n):
-        places = columns - (view - scene.ref) * planes[:, None]
+        places = columns - np.float32(scene.steps(view)) * planes[:, None]
         inside = (places >= 0) & (places <= scene.width - 1)
         here = np.stack([_sampled(line, places) for line in scene.views[view, rows].astype(np.float32)]), inside
         if before is not None:

@@ -5,26 +5,26 @@ last digit.
 """
 
 import re
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Literal, get_args
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from typing import Any, Literal, get_args
 
 import pandas as pd
 from attrs import frozen
 
-from matbench.errors import UserError, one_line, unknown
+from matbench.errors import UserError, unknown
+from matbench.files.csv_tables import csv_text
 from matbench.measures.metrics import Better
 from matbench.measures.statistics import FEW
 from matbench.reports import standing, tables
 from matbench.reports.tables import METRIC, NOT_RANKED, REGION, REGIONS, Shared
 from matbench.results.comparable import SILENT
+from matbench.safe_text import printable
 
 Format = Literal["tex", "md", "csv"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 MEAN, RANK = "mean", "mean rank"
 NONE = "–"
-_RESULTS = {"algorithm": str, "params": str, "scene": str, "view": str, "region": str, "metric": str, "unit": str}
-_CELLS = {"algorithm": str, "params": str, "scene": str, "status": str, "reason": str}
 
 
 @frozen(eq=False)
@@ -84,37 +84,6 @@ class Sheet:
 
 def _judged(regions: Sequence[str]) -> str:
     return REGION if REGION in regions else regions[0]
-
-
-def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """``results.csv`` and ``cells.csv`` of a finished run; its scenes are not needed.
-
-    Raises
-    ------
-    UserError
-        If they are missing or damaged.
-    """
-    read = (
-        _read(folder / "results.csv", _RESULTS, ("value", "pixels", "answered")),
-        _read(folder / "cells.csv", _CELLS, ()),
-    )
-    return tables.labelled(read[0]), tables.labelled(read[1])
-
-
-def _read(path: Path, texts: Mapping[str, type], numbers: Sequence[str]) -> pd.DataFrame:
-    try:
-        # a method may be called "nan": only in columns of numbers does nothing mean missing
-        frame = pd.read_csv(path, dtype=dict(texts), keep_default_na=False)
-        for name in [name for name in numbers if name in frame or name != "answered"]:  # older tables have it not
-            frame[name] = pd.to_numeric(frame[name].replace("", None))
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}; give the folder of a finished run") from error
-    except (ValueError, KeyError) as error:
-        raise UserError(f"{path} is damaged: {one_line(error)}") from error
-    missing = [name for name in texts if name not in frame]
-    if missing:
-        raise UserError(f"{path} is damaged: it has no column {missing[0]!r}")
-    return frame
 
 
 def sheet(
@@ -222,7 +191,8 @@ def sheet(
 
 
 def _notes(cells: pd.DataFrame, scope: Shared, counts: Mapping[str, int]) -> list[str]:
-    count = f"Means over {len(scope.scenes)} of {len(scope.asked)} scenes"
+    mixed = f" ({scope.mixture}; each weighs the same)" if scope.mixture else ""
+    count = f"Means over {len(scope.scenes)} of {len(scope.asked)} scenes{mixed}"
     notes = [count + (": too few to conclude." if scope.distinct < FEW else ".")]
     fewer = [f"{region} {some}" for region, some in counts.items() if some != len(scope.scenes)]
     if fewer:
@@ -237,11 +207,22 @@ def _notes(cells: pd.DataFrame, scope: Shared, counts: Mapping[str, int]) -> lis
 
 def formatted(made: Sheet, format: Format) -> str:
     """The table in one of `FORMATS`."""
-    return {"tex": latex, "md": markdown, "csv": comma_separated}[format](made)
+    return together([made], format)
 
 
-def comma_separated(made: Sheet) -> str:
-    """One row for each scene and method, `MEAN` first; what was left without a number is told in ``note``."""
+def together(made: Sequence[Sheet], format: Format) -> str:
+    """The tables of several metrics in one of `FORMATS`, one below the other; as CSV they are one table."""
+    if format == "csv":
+        return comma_separated(*made)
+    return "\n".join({"tex": latex, "md": markdown}[format](one) for one in made)
+
+
+def comma_separated(*made: Sheet) -> str:
+    """One row for each metric, scene and method, `MEAN` first; what was left without a number is told in ``note``."""
+    return csv_text(pd.concat(map(_noted, made), ignore_index=True))
+
+
+def _noted(made: Sheet) -> pd.DataFrame:
     unranked = made.texts["method"].map(dict(made.unranked)).where(made.texts["scene"] == MEAN)
     apart = [[region for region in made.regions if row[region] == NOT_RANKED] for _, row in made.places.iterrows()]
     notes = [
@@ -250,7 +231,7 @@ def comma_separated(made: Sheet) -> str:
     ]
     more = pd.DataFrame({"metric": made.metric, "unit": made.unit, "note": notes})
     # not `assign`: a region may be called "note"
-    return pd.concat([made.texts.replace(NONE, ""), more], axis=1).to_csv(index=False, lineterminator="\n")
+    return pd.concat([made.texts.replace(NONE, ""), more], axis=1)
 
 
 def _heads(made: Sheet) -> list[str]:
@@ -277,11 +258,11 @@ def _told(made: Sheet) -> list[str]:
 def markdown(made: Sheet) -> str:
     """A table as GitHub and most others read it, its caption above and its notes below."""
     marks = {0: "{}", 1: "**{}**", 2: "<ins>{}</ins>", NOT_RANKED: "{}" + md(tables.ASIDE)}
-    heads, left = _heads(made), 2 if made.has_scenes else 1
-    lines = [md(made.caption), "", "| " + " | ".join(map(md, heads)) + " |"]
-    lines.append("|" + "|".join([" :-- "] * left + [" --: "] * (len(heads) - left)) + "|")
-    lines += ["| " + " | ".join(marks[place].format(md(text)) for text, place in row) + " |" for _, row in _rows(made)]
-    return "\n".join([*lines, "", *(f"- {md(note)}" for note in _told(made))]) + "\n"
+    heads, left = list(map(md, _heads(made))), 2 if made.has_scenes else 1
+    rows = [[marks[place].format(md(text)) for text, place in row] for _, row in _rows(made)]
+    sides = ["left"] * left + ["right"] * (len(heads) - left)
+    body = pd.DataFrame(rows, columns=heads).to_markdown(index=False, disable_numparse=True, colalign=sides)
+    return "\n".join([md(made.caption), "", body, "", *(f"- {md(note)}" for note in _told(made))]) + "\n"
 
 
 def md(text: str) -> str:
@@ -290,7 +271,7 @@ def md(text: str) -> str:
     >>> md("a_b|<c>")
     'a\\\\_b\\\\|&lt;c&gt;'
     """
-    line = " ".join(_printable(text).split())
+    line = " ".join(printable(text).split())
     line = line.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return re.sub(r"([\\`*_\[\]|~$#])", r"\\\1", line)
 
@@ -324,11 +305,31 @@ def tex(text: str) -> str:
     >>> tex("a_b{50%}")
     'a\\_b\\{50\\%\\}'
     """
-    return "".join(_TEX.get(c, c if c.isascii() or c.isalpha() else "?") for c in " ".join(_printable(text).split()))
+    return "".join(_TEX.get(c, c if c.isascii() or c.isalpha() else "?") for c in " ".join(printable(text).split()))
 
 
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() or c.isspace() else "?" for c in text)
+_PLAIN = {
+    "styler.format.decimal": ".",
+    "styler.format.escape": None,
+    "styler.format.formatter": None,
+    "styler.format.na_rep": None,
+    "styler.format.thousands": None,
+    "styler.latex.environment": None,
+    "styler.render.max_columns": None,
+    "styler.render.max_elements": 2**18,
+    "styler.render.max_rows": None,
+    "styler.sparse.columns": True,
+    "styler.sparse.index": True,
+}
+"""What pandas' Styler is set to if its user has set nothing."""
+
+
+def tabular(heads: Sequence[str], rows: Iterable[Sequence[str]], columns: str) -> str:
+    """Heads and rows, LaTeX already, between the rules of booktabs, whatever the user has set."""
+    settings: list[Any] = list(chain.from_iterable(_PLAIN.items()))
+    with pd.option_context(*settings):
+        body = pd.DataFrame(list(rows), columns=list(heads)).style.hide(axis="index")
+        return str(body.to_latex(hrules=True, column_format=columns)).rstrip()
 
 
 def latex(made: Sheet) -> str:
@@ -339,17 +340,16 @@ def latex(made: Sheet) -> str:
     for is_new, row in _rows(made):
         # a number is set in mathematics only where it has a sign
         cells = [marks[place].format(re.sub(r"^\{-\}(?=\d)", r"$-$", tex(text))) for text, place in row]
-        if is_new and rows:  # pandas sets one rule, below the heads
+        if is_new and rows:
             cells[0] = rf"\midrule {cells[0]}"
         rows.append(cells)
-    body = pd.DataFrame(rows, columns=list(map(tex, heads))).style.hide(axis="index")
     lines = [
         r"% needs \usepackage[T1]{fontenc}, \usepackage{textcomp} and \usepackage{booktabs}",
         r"\begin{table}",
         r"\centering\footnotesize",
         rf"\caption{{{tex(made.caption)}}}",
         rf"\label{{tab:{re.sub('[^A-Za-z0-9]+', '-', made.metric).strip('-')}}}",
-        body.to_latex(hrules=True, column_format="l" * left + "r" * (len(heads) - left)).rstrip(),
+        tabular(list(map(tex, heads)), rows, "l" * left + "r" * (len(heads) - left)),
         r"\par\smallskip",
     ]
     lines += [rf"\parbox{{\linewidth}}{{\footnotesize {tex(note)}}}\par" for note in _told(made)]

@@ -4,16 +4,21 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from attrs import frozen
 
+from matbench import drawing
+from matbench._moved import moved_name
 from matbench.files.writing import write_bytes, write_text
 from matbench.reports.paper import tex
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+else:
+    __getattr__ = partial(moved_name, __name__)
 
 Width = Literal["column", "page"]
 INCHES: dict[Width, float] = dict(zip(get_args(Width), (3.25, 6.875), strict=True))
@@ -56,10 +61,7 @@ class CaptionedFigure:
 @contextmanager
 def small_print() -> Iterator[None]:
     """A context in which figures are drawn and saved with the small print of a paper."""
-    from matplotlib import rc_context
-
-    settings: Any = _LOOK
-    with rc_context(settings):
+    with drawing.style(_LOOK):
         yield
 
 

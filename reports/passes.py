@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TOTAL = "total"
+_LARGEST = 1e30  # per cent of the first pass; a stored history may hold any number
 
 
 def _told(report: Report, scope: Shared) -> dict[str, dict[str, list[NDArray[np.float64]]]]:
@@ -27,10 +28,17 @@ def _told(report: Report, scope: Shared) -> dict[str, dict[str, list[NDArray[np.
     return {method: found[method] for method in scope.methods if method in found}
 
 
+def _per_cent(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers in per cent of the first, which is positive; NaN for what no axis can show."""
+    with np.errstate(over="ignore"):
+        found = 100 * (values / values[0])
+    return np.where(np.abs(found) < _LARGEST, found, np.nan)
+
+
 def energies(report: Report, scope: Shared) -> "Figure | None":
     """A panel for each method with an energy: the total in per cent of the first pass, a line for each cell."""
     told = {m: names[TOTAL] for m, names in _told(report, scope).items() if TOTAL in names}
-    drawn = {m: [100 * cell / cell[0] for cell in cells if cell[0] > 0] for m, cells in told.items()}
+    drawn = {m: [_per_cent(cell) for cell in cells if cell[0] > 0] for m, cells in told.items()}
     drawn = {m: cells for m, cells in drawn.items() if cells}
     if not drawn:
         return None
@@ -43,7 +51,7 @@ def energies(report: Report, scope: Shared) -> "Figure | None":
         axes.plot(padded.columns, padded.median(), color=page_figures.INK, lw=2)
         axes.set_ylim(bottom=0, top=max(105.0, float(np.nanmax(padded.to_numpy())) * 1.05))
         axes.set_title(
-            page_figures.printable(method, 36), loc="left", fontsize=9, color=page_figures.INK, parse_math=False
+            page_figures.shortened(method, 36), loc="left", fontsize=9, color=page_figures.INK, parse_math=False
         )
         page_figures.dress(axes)
         axes.set_xlabel("pass", color=page_figures.INK)
@@ -59,8 +67,9 @@ def lines(report: Report, scope: Shared) -> list[list[str]]:
         for name, cells in names.items():
             passes = sorted({len(values) for values in cells})
             known = [values[np.isfinite(values)] for values in cells]
-            change = [100 * (v[-1] / v[0] - 1) for v in known if v[0] > 0]
-            shown = f"{np.median(change):+.1f}" if change else "–"
+            change = [_per_cent(v)[-1] - 100 for v in known if v[0] > 0]
+            middle = np.median(change) if change else np.nan
+            shown = f"{middle:+.1f}" if abs(middle) < 1e6 else f"{middle:+.1e}" if np.isfinite(middle) else "–"
             said = f"{passes[0]}" if len(passes) == 1 else f"{passes[0]} to {passes[-1]}"
             out.append([method, name, str(len(cells)), said, shown])
     return out

@@ -14,6 +14,7 @@ from matbench.reports.content import Report
 from matbench.reports.encoding import LEAST_SIDE, Coding, exact, photograph, side_for, size_within
 from matbench.reports.tables import Shared
 from matbench.scene import Scene
+from matbench.shelf import facts_of
 
 _BESIDES = 4  # pictures of a scene besides its methods': the truth, the view, slices
 
@@ -53,7 +54,7 @@ def gallery(report: Report, scope: Shared, most: int = MOST) -> Gallery:
 
     Maps full of noise hardly compress. So if all take more than `most` characters, they are made again, smaller.
     """
-    longest = max((max(scene.height, scene.width) for scene in report.scenes.values()), default=LEAST_SIDE)
+    longest = max((max(known.size) for known in facts_of(report.scenes).values()), default=LEAST_SIDE)
     side = min(side_for((len(scope.methods) + _BESIDES) * len(scope.asked)), longest)
     found = _gallery(report, scope, side)
     while (taken := found.characters) > most and side > LEAST_SIDE:
@@ -146,7 +147,7 @@ def _map(
     if disparity is not None:
         disparity = disparity.astype(np.float32, copy=False)
         out["map"] = coding.encode(disparity, scene.pair_steps, side)
-        out["spread"] = None if seeing is None else error_spread.spread(disparity, scene, seeing)
+        out["spread"] = None if seeing is None else error_spread.spread(disparity, scene, seeing, report.wrong)
     return out
 
 

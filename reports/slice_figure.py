@@ -105,13 +105,13 @@ def draw(scene: Scene, plane: EpipolarPlane, method: str, width: Width = "column
     method
         The method's name with its changed parameters, for the caption.
     """
-    from matplotlib.figure import Figure
-
     inches, count = INCHES[width], len(plane.slices)
     truth = scene.truth.get(scene.ref)
     top = inches * (0.46 if truth is not None else 0.6) * scene.height / scene.width + 0.2
     each = SLICE_HEIGHT * (inches / INCHES["column"]) ** 0.5
     with small_print():
+        from matplotlib.figure import Figure
+
         figure = Figure(figsize=(inches, top + count * (each + 0.14) + 0.3))
         figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.04, wspace=0.02, hspace=0.02)
         upper, lower = figure.subfigures(2, 1, height_ratios=[top, count * (each + 0.14) + 0.3], squeeze=False)[:, 0]

@@ -9,7 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from matbench.reports.page_figures import INK
-from matbench.reports.paper import tex
+from matbench.reports.paper import tabular, tex
+from matbench.reports.standing import verdict
 from matbench.reports.tables import EFFECT, METRIC, REGIONS, interval, share, text
 from matbench.results.comparable import SILENT
 
@@ -41,7 +42,8 @@ def lines(ablation: pd.DataFrame, metric: str = METRIC) -> pd.DataFrame:
             "interval": interval(row["low"], row["high"]),
             "size": text(row["effect_size"], EFFECT, signed=True),
             "scenes": str(row["scenes"]),
-            "verdict": row["verdict"] + (f" ({share(row['answered'])})" if row["verdict"] == SILENT else ""),
+            "verdict": verdict(row["verdict"], row["enough"])
+            + (f" ({share(row['answered'])})" if row["verdict"] == SILENT else ""),
         }
         for row in shown.to_dict("records")
     ]
@@ -71,8 +73,8 @@ def latex(ablation: pd.DataFrame, metric: str = METRIC) -> str:
         table[name] = table[name].map(tex)
     for name in ("change", "interval"):
         table[name] = table[name].str.replace("-", "$-$").str.replace("–", "--")
-    body = table.style.hide(axis="index").to_latex(hrules=True, column_format="llrrrl")
-    return f"% {metric}: mean change, 95 % bootstrap interval over scenes\n{body}"
+    body = tabular(list(table.columns), table.to_numpy().tolist(), "llrrrl")
+    return f"% {metric}: mean change, 95 % interval over scenes\n{body}\n"
 
 
 def forest(ablation: pd.DataFrame, metric: str = METRIC) -> "Figure | None":

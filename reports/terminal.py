@@ -1,6 +1,6 @@
 """The tables of a run in a terminal. They fit 80 columns, and brackets in names are not read as markup."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import pandas as pd
 from rich import box
@@ -12,6 +12,7 @@ from rich.text import Text
 from matbench.measures.metrics import Better
 from matbench.measures.statistics import FEW
 from matbench.reports.costs import CLOCK, timing_note
+from matbench.reports.standing import correction, lead, told, words
 from matbench.reports.tables import (
     ASIDE,
     METRIC,
@@ -21,11 +22,13 @@ from matbench.reports.tables import (
     Shared,
     aside_note,
     count,
+    interval,
     labelled,
     means,
     metrics,
     per_scene,
     places,
+    regions,
     shared,
     summarised,
     summary,
@@ -36,16 +39,29 @@ from matbench.reports.tables import text as shown
 WIDTH = 80
 NARROW = ("disc", "textureless")
 _PADDING = 2
+_NAMES = 12  # columns that the names of scenes have at least
+_NAMED_METHOD, _METRIC = 24, 11  # columns that a method's name, and a metric, take at most
 _LOG = r" \(log: [^ ]+\)$"
+_SCENES = 30  # scenes that have a line of their own
 _NAMED = 3  # scenes that are named where a method fails on many for the same reason
 
 
 def tables(
-    results: pd.DataFrame, cells: pd.DataFrame, metric: str = METRIC, better: Better = "lower", width: int = WIDTH
+    results: pd.DataFrame,
+    cells: pd.DataFrame,
+    metric: str = METRIC,
+    better: Better = "lower",
+    width: int = WIDTH,
+    others: Mapping[str, Better] = {},
 ) -> list[Table]:
-    """The summary, its regions over all views, every scene, and the failed cells; empty tables are left out.
+    """The summary, its other regions, other metrics, every scene, and the failed cells; empty tables are left out.
 
     Where the summary does not fit the terminal it leaves out the regions of `NARROW`.
+
+    Parameters
+    ----------
+    others
+        Further metrics, which are shown in `REGION` -> which direction of them is better.
     """
     scope = shared(results, cells)
     out = []
@@ -61,6 +77,14 @@ def tables(
         if per_scene(results, VIEWS[0], metric).notna().any(axis=None):
             heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in over_views}
             out.append(_summary(results, cells, scope, metric, better, "by the views that see a point", heads))
+        out += _differences(results, cells, metric, better)
+        own = [r for r in regions(results[results["metric"] == metric]) if r not in (*REGIONS, *VIEWS)]
+        if own:
+            heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in own}
+            out.append(_summary(results, cells, scope, metric, better, "by the scenes' own regions", heads, own))
+        measured = [m for m in (metric, *others) if m in set(results["metric"])]
+        if len(measured) > 1:
+            out += _by_metric(results, cells, scope, measured, {metric: better, **others}, width)
     if len(results):
         out += _scenes(results, cells, scope, metric, better, width)
     bad = labelled(cells)
@@ -70,7 +94,8 @@ def tables(
     return out
 
 
-def _plain(title: str) -> Table:
+def plain(title: str) -> Table:
+    """An empty table as all of them look."""
     table = Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     table.padding = (0, 1, 0, 0)  # with the box's own column two blanks, so that methods' names fit, too
     return table
@@ -95,12 +120,15 @@ def _summary(
     better: Better,
     what: str,
     heads: dict[str, str],
+    own: Sequence[str] = (),
 ) -> Table:
     """Methods x the columns of the summary that have a heading; below them, how many scenes each is over."""
     rows, unit = summary(results, cells, metric, better), metrics(results).get(metric, "%")
+    for region in own:
+        rows[f"{metric} {region}"] = means(results, scope, region, metric).reindex(rows.index)
     hint = "; too few scenes to conclude" if scope.distinct < FEW else ""
-    over = f"{len(scope.scenes)} of {len(scope.asked)} scenes"
-    table = _plain(f"{metric} ({unit}) {what}, mean over {over}{hint}")
+    over = f"{len(scope.scenes)} of {len(scope.asked)} scenes{f' ({scope.mixture})' if scope.mixture else ''}"
+    table = plain(f"{metric} ({unit}) {what}, mean over {over}{hint}")
     table.show_footer = len(scope.scenes) > 1
     table.add_column("#", justify="right", no_wrap=True)
     table.add_column("method", Text("scenes", style="italic"), overflow="fold", min_width=12)
@@ -135,9 +163,62 @@ def _summary(
     return table
 
 
+def _by_metric(
+    results: pd.DataFrame,
+    cells: pd.DataFrame,
+    scope: Shared,
+    names: Sequence[str],
+    better: Mapping[str, Better],
+    width: int,
+) -> list[Table]:
+    """Methods x metrics, means in `REGION`, in as many tables as it takes to stay within the width."""
+    rows, units = summary(results, cells, names[0], better[names[0]]), metrics(results)
+    columns = {name: means(results, scope, REGION, name) for name in names}
+    asides = {name: too_silent(means(results, scope, REGION, name, "answered")) for name in names}
+    at_once, out = max(1, (min(width, WIDTH) - _NAMED_METHOD) // _METRIC), []
+    for start in range(0, len(names), at_once):
+        part = names[start : start + at_once]
+        table = plain(f"by metric, in {REGION!r}, mean over {len(scope.scenes)} of {len(scope.asked)} scenes")
+        table.add_column("method", overflow="fold", min_width=12)
+        marks = {}
+        for name in part:
+            rivals = [str(m) for m in rows.index if scope.is_ranked(str(m)) and m not in asides[name]]
+            marks[name] = places(columns[name].reindex(rivals), units[name], better[name])
+            head = name.replace("_", "_\n") + (f"\n{units[name]}" if units[name] else "")
+            table.add_column(Text(head), justify="right", no_wrap=True, vertical="top")
+        for method, row in rows.iterrows():
+            values = [
+                _number(columns[n][str(method)], units[n], marks[n].get(method, 0), method in asides[n]) for n in part
+            ]
+            table.add_row(Text(str(method)), *values, style="" if row["ranked"] else "dim")
+        if any(asides[name] for name in part):
+            table.caption, table.caption_justify = Text(aside_note()), "left"
+        out.append(table)
+    return out
+
+
+def _differences(results: pd.DataFrame, cells: pd.DataFrame, metric: str, better: Better) -> list[Table]:
+    """Is it real? The differences from the best method, with intervals and verdicts."""
+    found = lead(results, cells, metric, better)
+    if not found.behind:
+        return []
+    unit = metrics(results).get(metric, "%")
+    table = plain(f"{metric} ({unit}) in {REGION!r}: difference from {found.best}, paired by scene")
+    table.add_column("method", overflow="fold", min_width=12)
+    for head in ("mean", "95 % interval"):
+        table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("verdict", overflow="fold")
+    for method, effect in found.behind.items():
+        said = words(told(effect), better == "higher")
+        ends = interval(effect.low, effect.high)
+        table.add_row(Text(method), Text(shown(effect.mean, "%", signed=True)), Text(ends), Text(said))
+    table.caption, table.caption_justify = Text(correction(found.compared)), "left"
+    return [table]
+
+
 def _short(scenes: Iterable[str]) -> dict[str, str]:
     """Scene -> its name without the dataset, if the names still differ."""
-    tails = {scene: scene.partition("/")[2] or scene for scene in scenes}
+    tails = {scene: scene if scene[:1] in "\"'" else scene.partition("/")[2] or scene for scene in scenes}
     return tails if len(set(tails.values())) == len(tails) else {scene: scene for scene in tails}
 
 
@@ -161,7 +242,8 @@ def _scenes(
         for column in ("value", "answered")
     )
     names = _short(scope.asked)
-    first = min(max(map(len, names.values()), default=0), 28)
+    # the column of scenes, as wide as it will be, and its own padding
+    first = max(_NAMES, min(max(map(len, names.values()), default=0), 28)) + _PADDING
     heads = _headings(methods, numbers, room - first)
     at_once = len(methods) if not heads[0].startswith("#") else max(1, (room - first) // (7 + _PADDING))
     bad = labelled(cells)
@@ -170,11 +252,14 @@ def _scenes(
     out = []
     for start in range(0, len(methods), at_once):
         part = methods[start : start + at_once]
-        table = _plain(f"{metric} ({unit}) in {REGION!r}, scene by scene")
-        table.add_column("scene", overflow="fold", min_width=12)
+        table = plain(f"{metric} ({unit}) in {REGION!r}, scene by scene")
+        if (more := len(values) - _SCENES) > 0:
+            table.caption, table.caption_justify = Text(f"and {more} more scenes: results.csv has them"), "left"
+        table.add_column("scene", overflow="fold", min_width=_NAMES)
         for head in heads[start : start + at_once]:
             table.add_column(Text(head), justify="right", overflow="fold")
-        for (scene, row), (_, over) in zip(values.iterrows(), answered.iterrows(), strict=True):
+        shown_first = zip(values.head(_SCENES).iterrows(), answered.head(_SCENES).iterrows(), strict=True)
+        for (scene, row), (_, over) in shown_first:
             asides = too_silent(over)
             marks = places(row[[m for m in methods if scene in scope.has[m] and m not in asides]], unit, better)
             shown_row = [
@@ -190,7 +275,7 @@ def _scenes(
 
 def _bad(bad: pd.DataFrame) -> Table:
     """The cells without a score; those of one method with the same reason are in one row."""
-    table = _plain(f"{len(bad)} cell{'s' if len(bad) != 1 else ''} without a score")
+    table = plain(f"{len(bad)} cell{'s' if len(bad) != 1 else ''} without a score")
     for head in ("method", "scene", "seed", "status", "reason"):
         table.add_column(head, overflow="fold", justify="right" if head == "seed" else "left")
     bad = bad.fillna({"reason": ""})

@@ -5,7 +5,7 @@ import signal
 import tempfile
 import threading
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 from machines import Machines
+from tools import need
 
 from matbench.plans.plugins import kernel_cache
 from matbench.solving import check_scenes
 
 if TYPE_CHECKING:
     from following import Desk
+    from real import Real
 
     from matbench.reports.content import Report
 
@@ -31,6 +33,17 @@ os.environ["XDG_DATA_HOME"] = _own.name
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Count what was skipped, by reason: a tool or a scene that is missing shall not go unnoticed."""
+    skipped = [report.longrepr for report in terminalreporter.stats.get("skipped", [])]
+    said = [str(one[2] if isinstance(one, tuple | list) else one) for one in skipped]
+    reasons = Counter(one.removeprefix("Skipped: ") for one in said)
+    if reasons:
+        terminalreporter.section(f"{reasons.total()} skipped, by reason")
+        for reason, count in reasons.most_common():
+            terminalreporter.line(f"{count:4}  {reason}")
+
+
 @pytest.fixture(scope="session")
 def data_root() -> Path:
     """The folder of real scenes; without one, tests on real scenes skip and say so."""
@@ -41,6 +54,14 @@ def data_root() -> Path:
     if not root.is_dir():
         pytest.fail(f"MATBENCH_DATA names {str(root)!r}, which is no folder")
     return root.resolve()
+
+
+@pytest.fixture(scope="session")
+def real(data_root: Path) -> "Real":
+    """The folder of real scenes for a test that says what it needs of it: ``real("middlebury2003/teddy")``."""
+    from real import Real
+
+    return Real(data_root)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +97,7 @@ def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def machines(tmp_path: Path) -> Iterator[Machines]:
     """A Dask cluster without any workers yet."""
-    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'matbench-stereo[cluster]'")
+    need("dask")
     place = tmp_path / "elsewhere"
     place.mkdir()
     found = Machines(place)

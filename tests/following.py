@@ -3,7 +3,8 @@
 A line is run as it stands but for these rules:
 
 - pictures are 64x48 pixels: synthetic scenes are computed so, `DIR` holds the middle of the real pictures of four
-  scenes, and `--row 144` is row 24. Of `synthetic/*` only `synthetic/box` is taken;
+  scenes, and `--row 144` is row 24. Of `synthetic/*` only `synthetic/box` is taken, of a set of worlds only the first;
+- a run that grows until it decides has six worlds to come to;
 - where no method is named `sgbm` is taken, not all of them, and where no scene is `synthetic/box`;
 - cells share a process (`--isolation shared`) where nothing is said of how they run; `--jobs 4` are 2;
 - of all pages of reports that a file of tests asks for only the first is drawn; all tables are written;
@@ -11,6 +12,7 @@ A line is run as it stands but for these rules:
 - `check` tries its methods on scenes of two thirds the size;
 - `bench` and `prove.py` run in a copy of the checkout that has one method and one kernel, with fewer rounds and tries;
 - `fetch` needs the network: it tells what it would do (`--dry-run`);
+- `net.onnx` is a small network that compares blocks;
 - `view` opens a window: the recording that it would show is looked for;
 - installing needs the network, too: `.ci/run` does it before it runs the tests.
 """
@@ -28,11 +30,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from onnx_models import block_matcher
 from scene_files import Layers, write_pair, write_png
-from shown import LINES, METHOD, OWN_FILES, ROOT
+from shown import LINES, METHOD, OWN_FILES, ROOT, SWEEP
+from tools import find
 
+from matbench import load_scene
 from matbench.cli import main
-from matbench.comparison import Comparison
+from matbench.prepared import Comparison
 from matbench.spec import Spec, parse
 
 WIDTH, HEIGHT = 64, 48
@@ -55,7 +60,7 @@ def words(line: str) -> list[str]:
 GROUPS: Mapping[str, Callable[[str], bool]] = {
     "install": lambda line: "pip install " in line,
     "plain": lambda line: (
-        command(line) in ("list", "scene", *STAGES)
+        command(line) in ("list", "maps", "scene", *STAGES)
         or (command(line) in RUNS and "--data " not in line and "--dask " not in line)
     ),
     "real": lambda line: command(line) in RUNS and "--data " in line,
@@ -90,7 +95,9 @@ def shortened(line: str, **places: str) -> list[str]:
     for before, token in pairwise(["", *tokens]):
         if before in ("--row", "--rows"):
             out.append(",".join(str(int(row) // 6) for row in token.split(",")))
-        elif before == "-s" or token.startswith("synthetic/"):
+        elif before == "-s" and "--until" in tokens:
+            out += [one for seed in range(6) for one in _small(f"synthetic/world-{seed}")]
+        elif before == "-s" or token.startswith(("synthetic/", "worlds/")):
             out += _small(token)
         elif before == "--jobs":
             out.append("2")
@@ -104,11 +111,25 @@ def shortened(line: str, **places: str) -> list[str]:
     return [*out, "--dry-run"] if tokens[0] == "fetch" else out
 
 
+FIRST = {"synthetic/*": "synthetic/box"} | dict.fromkeys(
+    ("worlds/quick", "worlds/standard", "worlds/large"), "synthetic/world-0"
+)
+"""What stands for several scenes -> the one that is taken."""
+
+
 def _small(selector: str) -> list[str]:
     """The same scenes in small pictures."""
-    found = [Spec("synthetic/box" if s.name == "synthetic/*" else s.name, s.options) for s in parse(selector)]
+    named = [(FIRST.get(spec.name, spec.name), spec.options) for spec in parse(selector)]
+    found = list({str(Spec(*one)): Spec(*one) for one in named}.values())
     size = {"size": f"{WIDTH}x{HEIGHT}"}
     return [str(Spec(s.name, {**s.options, **size}) if s.name.startswith("synthetic/") else s) for s in found]
+
+
+def _own_maps(folder: Path) -> None:
+    """Somebody's results: the map of the synthetic box, which is its truth."""
+    scene = load_scene(f"synthetic/box[size={WIDTH}x{HEIGHT}]")
+    folder.mkdir()
+    np.save(folder / "box.npy", scene.truth[scene.ref] * scene.pair_steps)
 
 
 class Desk:
@@ -127,7 +148,14 @@ class Desk:
         for name, text in OWN_FILES.items():
             (folder / name).write_text(text)
         (folder / "mine.py").write_text(METHOD)
+        (folder / "old").mkdir()
+        (folder / "old" / "mine.py").write_text(METHOD.replace("0.5", "0.4"))
         _own_program(folder / "mine")
+        (folder / "sweep").write_text(SWEEP.replace("/usr/bin/env python3", sys.executable, 1))
+        (folder / "sweep").chmod(0o755)
+        _own_maps(folder / "results")
+        if find("onnx"):
+            block_matcher(folder / "net.onnx")
         (folder / "algorithms").symlink_to(ROOT / "algorithms")
         draw = Comparison.report
 

@@ -5,18 +5,11 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import psutil
-
-
-def wait_until(happens: Callable[[], object], seconds: float = 120) -> None:
-    end = time.monotonic() + seconds
-    while not happens():
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.05)
+from waiting import wait_until
 
 
 class Machines:
@@ -55,9 +48,9 @@ class Machines:
         self.client.close()
         for one in workers:
             one.terminate()
-        psutil.wait_procs(workers, timeout=60)  # a worker itself waits 30 s for its threads
+        psutil.wait_procs(workers, timeout=300)  # a worker itself waits 30 s for its threads
         scheduler.terminate()
-        _, left = psutil.wait_procs(every, timeout=60)
+        _, left = psutil.wait_procs(every, timeout=300)
         for process in left:
             process.kill()
         assert not left, f"nothing outlives the cluster: {left}"

@@ -2,8 +2,6 @@
 
 import json
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -34,13 +32,6 @@ class Seeded:
         values = np.random.default_rng(context.seed).random(scene.views.shape[1:3], np.float32)
         return Estimate({scene.ref: 3 * values})
 """
-
-
-def wait_until(happens: Callable[[], object], what: str = "it") -> None:
-    end = time.monotonic() + PATIENCE
-    while not happens():
-        assert time.monotonic() < end, f"{what} never happened"
-        time.sleep(0.01)
 
 
 def command(plugin: Path, out: Path, *more: str) -> list[str]:

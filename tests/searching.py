@@ -4,14 +4,17 @@ It is told what to look for by a file that holds it reversed, so that what it lo
 somebody else has put it there.
 """
 
+import mmap
 import os
 import stat
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from matbench import Context, Estimate, Scene, load_scene
 
@@ -19,8 +22,20 @@ _CHUNK = 1 << 24
 _OVERLAP = 4096
 
 
-def _memory() -> Iterator[bytes]:
-    """All memory that this process could write to, reversed, so that no copy of what is found comes into being."""
+def _pages(size: int) -> tuple[mmap.mmap, NDArray[np.uint8], range]:
+    """Memory of its own for what was read, and its addresses: what lies there is not to be found again."""
+    pages = mmap.mmap(-1, size)
+    array = np.frombuffer(pages, np.uint8)
+    return pages, array, range(first := array.ctypes.data, first + size)
+
+
+def _memory() -> Iterator[tuple[mmap.mmap, int]]:
+    """All memory that this process could write to, reversed, but for where it is reversed; how many bytes.
+
+    Nothing of it is copied elsewhere, as reversed copies of what it is told would be what it looks for.
+    """
+    turned, backwards, own = _pages(_CHUNK + _OVERLAP)
+    _, forwards, too = _pages(_CHUNK + _OVERLAP)
     with Path("/proc/self/mem").open("rb", buffering=0) as memory:
         for line in Path("/proc/self/maps").read_text().splitlines():
             span, rights, *_ = line.split()
@@ -30,17 +45,21 @@ def _memory() -> Iterator[bytes]:
             for start in range(first, last, _CHUNK):
                 with suppress(OSError, ValueError, OverflowError):
                     memory.seek(start)
-                    found = memory.read(min(_CHUNK + _OVERLAP, last - start))
-                    yield np.frombuffer(found, np.uint8)[::-1].tobytes()
+                    count = memory.readinto(forwards[: min(_CHUNK + _OVERLAP, last - start)])
+                    for place in (own, too):  # neighbours may be one span with it
+                        forwards[max(0, place.start - start) : max(0, place.stop - start)] = 0
+                    np.copyto(backwards[:count], forwards[:count][::-1])
+                    yield turned, count
 
 
-def _files() -> Iterator[bytes]:
+def _files() -> Iterator[tuple[bytes, int]]:
     """All open files, and all in shared memory."""
     paths = [*Path("/proc/self/fd").iterdir(), *Path("/dev/shm").rglob("*")]  # noqa: S108
     for path in paths:
         with suppress(OSError):
             if stat.S_ISREG(path.stat().st_mode):
-                yield np.frombuffer(path.read_bytes(), np.uint8)[::-1].tobytes()
+                content = path.read_bytes()[::-1]
+                yield content, len(content)
 
 
 @frozen
@@ -76,9 +95,8 @@ class Searches:
         if self.plant:
             held.append([np.frombuffer(needle, np.uint8)[::-1].copy() for needle in wanted])
         found = set()
-        places = [os.fsencode(value)[::-1] for value in os.environ.values()]
-        for reached in (*places, *_memory(), *_files()):
-            found |= {number for number, needle in enumerate(wanted) if needle in reached and reached is not told}
-        # `told` and `wanted` hold the needles reversed, and reversed once more they are what `_memory` sees of them
+        places = [(text := os.fsencode(value)[::-1], len(text)) for value in os.environ.values()]
+        for reached, count in chain(places, _memory(), _files()):
+            found |= {number for number, needle in enumerate(wanted) if reached.find(needle, 0, count) >= 0}
         values = np.full((scene.height, scene.width), len(found), np.float32)
         return Estimate({scene.ref: values}, work={"found": len(found), "wanted": len(wanted)})

@@ -36,6 +36,7 @@ LINES = list(
 METHOD = blocks("python", "README.md")[0]
 SCENE = blocks("toml", "docs/guides/own-scene.md")[0]
 GROUPS = blocks("python", "docs/guides/own-method.md")[1]
+SWEEP = blocks("python", "docs/guides/own-method.md")[-2]
 SCRIPT = blocks("python", "docs/guides/own-method.md")[-1]
 OWN_FILES = dict(re.findall(r"`(\w+\.py)`:\n\n```python\n(.*?)```", TEXT["docs/guides/extending.md"], re.DOTALL))
 """The files that the page on extending has one write: name -> content."""

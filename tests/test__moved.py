@@ -1,4 +1,4 @@
-"""Old names of modules: they are found, with a warning."""
+"""Old names of modules, and of what is in them: they are found, with a warning."""
 
 import sys
 import warnings
@@ -30,14 +30,21 @@ def test_an_old_name_is_the_new_module_with_a_warning(name: str, monkeypatch: py
         assert import_module(old) is found
 
 
-@pytest.mark.parametrize("name", _moved.SCENES)
-def test_what_the_module_of_scenes_had_is_found_in_the_package(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    import matbench.scenes
-    from matbench.scenes import catalogue
-
-    monkeypatch.delitem(vars(matbench.scenes), name, raising=False)
-    with pytest.warns(DeprecationWarning, match=f"catalogue.{name}"):
-        assert getattr(matbench.scenes, name) is getattr(catalogue, name)
+@pytest.mark.parametrize(
+    ("module", "name"), [(module, name) for module, names in _moved.NAMES.items() for name in names]
+)
+def test_a_name_that_is_elsewhere_now_is_found_where_it_was(module: str, name: str) -> None:
+    home, _, now = _moved.NAMES[module][name].rpartition(".")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the module, once a process
+        vars(import_module(module)).pop(name, None)
+    with pytest.warns(DeprecationWarning, match=rf"{module}\.{name} has moved: import {home}\.{now}") as told:
+        found = getattr(import_module(module), name)
+    assert found is getattr(import_module(home), now)
+    assert told[-1].filename == __file__, "whoever uses it is warned"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert getattr(import_module(module), name) is found
 
 
 def test_other_names_are_as_unknown_as_ever() -> None:
@@ -45,14 +52,19 @@ def test_other_names_are_as_unknown_as_ever() -> None:
         import_module("matbench.meterics")
     with pytest.raises(ImportError, match="load_scenes"):
         exec("from matbench.scenes import load_scenes")  # noqa: S102
+    with pytest.raises(ImportError, match="flatten"):
+        exec("from matbench.spec import flatten")  # noqa: S102
 
 
 def test_a_plug_in_written_before_the_move_works(tmp_path) -> None:
     (tmp_path / "old.py").write_text(
         "from matbench.metrics import Metric\n"
+        "from matbench.spec import flat\n"
+        "from matbench.store import FINAL\n"
         "from matbench.scenes import load_scene\n"
         "from matbench import Estimate\n"
         "import numpy as np\n"
+        "@flat\n"
         "class Old:\n"
         "    def solve(self, scene, context):\n"
         "        return Estimate({scene.ref: np.zeros((scene.height, scene.width), np.float32)})\n"

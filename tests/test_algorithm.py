@@ -43,3 +43,14 @@ def test_without_more_nobody_listens_and_the_volume_is_wanted(scene: Scene) -> N
     context.probe.volume("similarity/0-1", None)  # type: ignore[arg-type]
     assert Solves().solve(scene, context).history == {}
     assert Context().probe is not context.probe, "none is shared"
+
+
+def test_a_method_that_does_not_say_so_gets_no_views_at_uneven_steps(scene: Scene) -> None:
+    views = np.zeros((3, 3, 4, 3), np.uint8)
+    uneven = Scene("toy", views, ("a0", "a1", "a2"), 2, Range(0, 2), {}, 1.0, positions=(0, 1, 2.5))
+    said = "it takes views at even steps, and these lie at 0, 1, 2.5: views=a1+a2 chooses two of them"
+    assert unsupported(Solves(), uneven) == said
+    takes = Declines(None)
+    takes.uneven = True  # type: ignore[attr-defined]
+    assert unsupported(takes, uneven) == ""
+    assert unsupported(Solves(), uneven.choose([1, 2])) == ""

@@ -1,5 +1,6 @@
 """What counts as a method's code, and what does not."""
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -171,7 +172,7 @@ def test_what_is_not_there_counts_as_missing(write: Write) -> None:
 
 
 def test_the_short_names_of_the_harness_do_not_drag_it_all_in(write: Write) -> None:
-    few = {"matbench.algorithm", "matbench.errors", "matbench.scene", "matbench.space"}
+    few = {"matbench.algorithm", "matbench.errors", "matbench.safe_text", "matbench.scene", "matbench.space"}
     ways = [
         "from matbench import Context, Estimate, Scene\n",
         "import matbench\ndef solve(x):\n    return matbench.Estimate(x)\n",
@@ -189,15 +190,20 @@ def test_the_short_names_of_the_harness_do_not_drag_it_all_in(write: Write) -> N
 def test_what_built_in_methods_import() -> None:
     known = plugins.installed("algorithms")
     parts = {name: set(plugins.code_of(plugin).parts) for name, plugin in known.items()}
-    common = {"matbench.algorithm", "matbench.errors", "matbench.scene", "matbench.space", "numpy", "attrs"}
+    common = {"matbench.algorithm", "matbench.errors", "matbench.safe_text", "matbench.scene", "matbench.space"}
+    common |= {"numpy", "attrs"}
     sgbm = {f"matbench.algorithms.{name}" for name in ("sgbm", "holes", "parameters")}
     assert parts["sgbm"] == {*common, *sgbm, "opencv-python-headless"}
-    reading = {"matbench.algorithms.command", "matbench.files.pfm", "matbench.files.images"}
+    reading = {"matbench.algorithms.command", "matbench.algorithms.cameras"}
+    files = "arrays", "images", "jpeg", "maps", "pfm", "plain", "removal", "temporary", "tiff", "unzip"
+    reading |= {f"matbench.files.{name}" for name in files}
     assert parts["command"] == {*parts["sgbm"], *reading}
     assert "matbench.algorithms.materiality.energy" in parts["materiality"]
     assert "numba" in parts["materiality"]
     assert not any("materiality" in name for name in parts["multiview_sgm"])
     assert not any("regions" in name for found in parts.values() for name in found), "scores alone need them"
+    assert [name for name, found in parts.items() if "matbench.spec" in found] == ["maps"], "it reads scenes' names"
+    assert not any("matbench.plans.kernel_cache" in found for found in parts.values()), "it changes no answer"
     folder = Path(code.__file__).parent / "algorithms"
     kernels = [
         file for file in folder.rglob("*.py") if "njit" in file.read_text() or "kernels import" in file.read_text()
@@ -311,11 +317,21 @@ def test_the_standard_library_does_not_count(write: Write) -> None:
     assert set(code.of_file(mine).parts) == {".mine"}
 
 
-def test_a_folder_counts_with_its_names(tmp_path: Path) -> None:
-    (tmp_path / "w").mkdir()
-    (tmp_path / "w" / "a").write_bytes(b"1")
-    before = code.of_content(tmp_path / "w")
-    (tmp_path / "w" / "a").rename(tmp_path / "w" / "b")
-    renamed = code.of_content(tmp_path / "w")
-    (tmp_path / "w" / "b").write_bytes(b"2")
-    assert len({before, renamed, code.of_content(tmp_path / "w")}) == 3
+def test_a_helper_of_any_size_counts_and_is_not_read_as_a_whole(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = write(mine="import table\n", table="import other\nNUMBERS = [1, 2]\n", other="")
+    usual = code.of_file(folder / "mine.py")
+    assert ".other" in usual.parts
+    monkeypatch.setattr(code, "_LARGEST_SOURCE", 20)
+    large = code.of_file(folder / "mine.py")
+    assert ".other" not in large.parts, "its imports are not looked for"
+    (folder / "table.py").write_text("import other\nNUMBERS = [1, 3]\n")
+    changed = code.of_file(folder / "mine.py")
+    assert changed.parts[".table"] != large.parts[".table"], "but its bytes count"
+
+
+def test_a_file_that_is_larger_than_any_module_is_not_read_at_all(write: Write) -> None:
+    folder = write(mine="import table\n", table="")
+    os.truncate(folder / "table.py", 1 << 40)
+    assert code.of_file(folder / "mine.py").parts[".table"] == "unreadable"
+    with pytest.raises(OSError, match="File too large"):
+        code.of_file(folder / "table.py")

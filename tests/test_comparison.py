@@ -8,27 +8,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from compared import SMALL, cells, compare
+from compared import SMALL, cells, compare, scored
 from places import METHODS
 
 import matbench
-from matbench import comparison
 from matbench.errors import UserError
-from matbench.plans.settings import Settings
+from matbench.runs.store import Store
 
 TINY = "synthetic/box[size=48x36]"
-
-
-def test_truth_beyond_a_range_is_told_once_for_each_scene(tmp_path: Path) -> None:
-    narrow = "synthetic/box[disparities=0:3 size=96x72]"
-    scene = matbench.load_scene(narrow)
-    beyond = int((scene.truth[scene.ref].astype(float) * scene.pair_steps > 3).sum())
-    assert 0 < beyond < scene.height * scene.width
-    ready = comparison.prepare("flat", [SMALL, narrow], plugin=[METHODS], out=tmp_path / "run")
-    (remark,) = ready.remarks
-    assert remark.startswith(f"{scene.name}: {beyond} of {scene.height * scene.width} pixels")
-    ready.run()
-    assert remark in ready.report(ready.tables()).read_text("utf-8")
 
 
 def test_one_bad_method_costs_only_its_own_cell(tmp_path: Path) -> None:
@@ -68,7 +55,7 @@ def test_what_fails_says_what_where_and_where_its_log_is(tmp_path: Path) -> None
         "class Calls:\n    def solve(self, scene, context):\n        import subprocess\n"
         "        return subprocess.run(['false'], check=True)\n"
     )
-    matbench.compare(["opens", "calls"], SMALL, out=tmp_path / "run", plugin=plugin)
+    scored(tmp_path, "opens", "calls", plugin=plugin)
     found = cells(tmp_path)
     for name, reason in {
         "opens": "FileNotFoundError: [Errno 2] No such file or directory: '/nowhere/weights.bin' (opens.py:3)",
@@ -80,41 +67,27 @@ def test_what_fails_says_what_where_and_where_its_log_is(tmp_path: Path) -> None
 
 
 def test_seeds_are_cells_of_their_own_and_repeat_themselves(tmp_path: Path) -> None:
-    results = compare(tmp_path, "noise", seed=[0, 1])
+    results = scored(tmp_path, "noise", seed=[0, 1])
     by_seed = results[(results.region == "all") & (results.metric == "avg")].set_index("seed").value
     assert by_seed[0] != by_seed[1]
-    again = matbench.compare(["noise"], SMALL, out=tmp_path / "other", plugin=[METHODS], seed=1)
+    again = scored(tmp_path / "other", "noise", seed=1)
     assert by_seed[1] == again[(again.region == "all") & (again.metric == "avg")].value.item()
-
-
-def test_the_same_request_resumes_and_computes_nothing_twice(tmp_path: Path) -> None:
-    compare(tmp_path, "flat", "exits")
-    place = tmp_path / "run" / "cells" / cells(tmp_path).cell["flat"] / "cell.json"
-    before = place.stat().st_mtime_ns
-    scores = (tmp_path / "run" / "results.csv").read_bytes()
-    started = []
-    again = comparison.prepare(["flat", "exits"], SMALL, out=tmp_path / "run", plugin=[METHODS])
-    again.run(lambda event, cell, outcome: started.append(cell.method.algorithm) if event == "start" else None)
-    again.tables()
-    assert started == ["exits"]  # what failed is tried again
-    assert place.stat().st_mtime_ns == before
-    assert (tmp_path / "run" / "results.csv").read_bytes() == scores
 
 
 def test_changed_code_is_computed_anew(tmp_path: Path) -> None:
     plugin = tmp_path / "mine.py"
     code = METHODS.read_text()
     plugin.write_text(code)
-    first = matbench.compare("flat", SMALL, out=tmp_path / "run", plugin=[plugin])
+    first = scored(tmp_path, "flat", plugin=plugin)
     plugin.write_text(
         code.replace("np.full((scene.height, scene.width), value", "np.full((scene.height, scene.width), value + 3")
     )
-    second = matbench.compare("flat", SMALL, out=tmp_path / "run", plugin=[plugin])
+    second = scored(tmp_path, "flat", plugin=plugin)
     assert not np.allclose(first.value, second.value, equal_nan=True)
 
 
 def test_a_folder_with_another_plan_is_left_alone(tmp_path: Path) -> None:
-    compare(tmp_path, "flat")
+    scored(tmp_path, "flat")
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "run").rglob("*")}
     with pytest.raises(UserError, match="holds a different plan"):
         compare(tmp_path, "flat[value=3]")
@@ -130,15 +103,9 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_a_method_too_large_for_the_warm_up_still_competes(tmp_path: Path) -> None:
-    results = compare(tmp_path, "needs_room")
+    results = scored(tmp_path, "needs_room")
     assert cells(tmp_path).status["needs_room"] == "ok"
     assert len(results)
-
-
-def test_one_scene_in_two_spellings_counts_once(tmp_path: Path) -> None:
-    names = ["synthetic/box[size=96x72]", "synthetic/box[seed=0 size=96x72]", "synthetic/box[size=96x72 views=0:5]"]
-    results = matbench.compare("flat", names, out=tmp_path / "run", plugin=METHODS)
-    assert results.scene.unique().tolist() == names[:1]
 
 
 @pytest.mark.parametrize("seed", [1.5, "12", None, [], [1, -1], True])
@@ -148,7 +115,7 @@ def test_seeds_are_whole_numbers(tmp_path: Path, seed: object) -> None:
 
 
 def test_timings_and_memory_are_measured(tmp_path: Path) -> None:
-    compare(tmp_path, "flat")
+    scored(tmp_path, "flat")
     row = cells(tmp_path).loc["flat"]
     assert 0 < float(row.seconds) < 5
     assert 10 < float(row.peak_mb) < 2000
@@ -160,16 +127,16 @@ def test_recordings_of_another_row_are_made_anew(tmp_path: Path) -> None:
         (row,) = json.loads(path.read_text())["outcome"]["recorded"]["rows"]
         return int(row)
 
-    compare(tmp_path, "flat", record=True)
+    scored(tmp_path, "flat", record=True)
     assert shown() == 36
-    store = comparison.Store(tmp_path / "run")
+    store = Store(tmp_path / "run")
     before = store.recording().stat().st_mtime_ns
     compare(tmp_path, "flat", record=True, row=36)
     assert store.recording().stat().st_mtime_ns == before
     compare(tmp_path, "flat", record=True, row=20)
     assert (shown(), store.recording().stat().st_mtime_ns > before) == (20, True)
     before = store.recording().stat().st_mtime_ns
-    compare(tmp_path, "flat", record=True)
+    scored(tmp_path, "flat", record=True)
     assert store.recording().stat().st_mtime_ns == before
 
 
@@ -192,17 +159,6 @@ def test_a_sweep_of_a_scene_is_a_curve(tmp_path: Path) -> None:
     assert 'id="curves"' in (tmp_path / "run" / "report.html").read_text()
 
 
-def test_a_scene_spelled_in_two_ways_keeps_its_place_on_the_curve(tmp_path: Path) -> None:
-    scenes = ["synthetic/box[size=48x36]", "synthetic/box[size=48x36 views=2,3,5]"]
-    ready = comparison.prepare(["flat"], scenes, out=tmp_path / "run", plugin=[METHODS])
-    assert len(ready.plan.cells) == 3
-    assert ready.plan.spellings == {"synthetic/box[size=48x36 views=5]": "synthetic/box[size=48x36]"}
-    assert ready.store.plan() == ready.plan
-    ready.run()
-    (sweep,) = ready.sweeps(ready.tables().results)
-    assert sweep.values == (2, 3, 5)
-
-
 def test_a_recording_that_fails_is_said_and_costs_no_score(tmp_path: Path) -> None:
     line = [sys.executable, "-m", "matbench", "compare", "-a", "shy", "--plugin", str(METHODS), "-s", SMALL, "--record"]
     done = subprocess.run([*line, "--out", "run"], cwd=tmp_path, capture_output=True, text=True, timeout=120)
@@ -212,14 +168,9 @@ def test_a_recording_that_fails_is_said_and_costs_no_score(tmp_path: Path) -> No
     assert cells(tmp_path).status["shy"] == "ok"
 
 
-def test_two_scenes_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A data set that calls two scenes the same: stood in for, as none that is built in does."""
-    from attrs import evolve
-
-    original = comparison.load_scene
-    monkeypatch.setattr(comparison, "load_scene", lambda name, data: evolve(original(name, data), name="x/same"))
-    with pytest.raises(UserError, match="two different scenes are called x/same"):
-        comparison.prepare(
-            "flat", [TINY, "synthetic/weak[size=48x36]"], out=tmp_path / "run", plugin=METHODS, settings=Settings()
-        )
-    assert not (tmp_path / "run").exists()
+@pytest.mark.parametrize("given", [{"out": "a\0b"}, {"plugin": ["a\0b.py"]}])
+def test_what_can_be_no_path_is_refused(given: dict[str, object], tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match="is no path: no file can have that name"):
+        matbench.compare(["sgbm"], TINY, **given)
+    assert list(tmp_path.iterdir()) == []

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from matbench.errors import UserError, failure, one_line, where
+from matbench.errors import LONGEST_NAME, UserError, failure, one_line, refuse_hidden, where
 
 
 class Silent(Exception):
@@ -116,3 +116,9 @@ def test_what_the_harness_alone_raises_has_no_place(tmp_path: Path) -> None:
     assert where(ValueError("never raised")) == ""
     own = _module(tmp_path / "mine.py", "from matbench.scene import Range\n\ndef bad():\n    return Range(3, 1)\n")
     assert where(_raised(own["bad"])) == "mine.py:4", "asked for by this line"
+
+
+def test_a_name_has_an_end() -> None:
+    refuse_hidden("scene", "a" * LONGEST_NAME)
+    with pytest.raises(UserError, match="scene has 4097 characters: names may have 4096"):
+        refuse_hidden("scene", "a" * (LONGEST_NAME + 1))

@@ -18,7 +18,11 @@ ELSEWHERE = {
     "benchmarks": "what `matbench bench` runs",
 }
 """Folders of tests that belong to no single module -> why."""
-OWN = {"test_layout.py": "of the tests themselves", "test_package.py": "of matbench/__init__.py: its public names"}
+OWN = {
+    "test_layout.py": "of the tests themselves",
+    "test_package.py": "of matbench/__init__.py: its public names",
+    "test_skips.py": "of the tests themselves: what they skip",
+}
 """Files at the top that belong to no module -> why."""
 
 

@@ -5,8 +5,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from attrs import field, frozen, validators
 
 from matbench.cli import main
+from matbench.errors import UserError
+from matbench.parameters import build
 
 MINE = '''
 import numpy as np
@@ -74,3 +77,13 @@ def test_a_plug_in_with_a_group(
 
     status, _, err = run(capsys, "ablate", "mine[blind=true share=0.2,0.9]", "-s", SCENE, *plugin)
     assert (status, err) == (2, "matbench: mine: share=0.2 changes nothing here: it takes blind=false\n")
+
+
+def test_a_refused_number_is_told_without_the_words_of_attrs() -> None:
+    @frozen
+    class Sign:
+        sign: int = field(default=1, validator=validators.in_((1, -1)))
+
+    with pytest.raises(UserError) as told:
+        build("m", Sign, {"sign": 2})
+    assert str(told.value) == "m: 'sign' must be in (1, -1) (got 2)"

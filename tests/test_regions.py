@@ -1,14 +1,22 @@
 """Regions: against published masks, exact visibility and small cases by hand."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from real import Real
 
 from matbench.datasets.middlebury import MIDDLEBURY_2001, MIDDLEBURY_2003
 from matbench.datasets.synthetic import SYNTHETIC, WORLDS
 from matbench.files.images import read_levels
-from matbench.regions import VIEW_REGIONS, counts, near_jumps, points_seen, regions, textureless, view_regions
+from matbench.regions import (
+    VIEW_REGIONS,
+    counts,
+    is_sparse,
+    near_jumps,
+    points_seen,
+    regions,
+    textureless,
+    view_regions,
+)
 from matbench.scene import Scene
 
 NAN = np.nan
@@ -26,19 +34,23 @@ def _overlap(a: np.ndarray, b: np.ndarray) -> float:
         (MIDDLEBURY_2003, "teddy", 0.95, 0.93),
     ],
 )
-def test_overlap_with_published_masks(data_root: Path, dataset, scene: str, occluded: float, jumps: float) -> None:
+def test_overlap_with_published_masks(real: Real, dataset, scene: str, occluded: float, jumps: float) -> None:
     """Intersection over union, for the occluded part inside `all` and for `disc`."""
-    folder = data_root / "middlebury" / "eval_v2" / scene
+    root = real(f"middlebury/eval_v2/{scene}", f"middlebury{dataset.year}/{scene}")
+    folder = root / "middlebury/eval_v2" / scene
     nonocc, everything, disc = (read_levels(folder / f"{name}.png") == 255 for name in ("nonocc", "all", "disc"))
-    found = dataset.load(scene, {}, data_root).regions
+    found = dataset.load(scene, {}, root).regions
     assert _overlap(found["occ"] & everything, everything & ~nonocc) > occluded
     assert _overlap(found["disc"] & everything, disc) > jumps
     if scene != "venus":  # there a border of 10 px was left out
         np.testing.assert_array_equal(found["all"], everything)
 
 
-def test_regions_nest(data_root: Path) -> None:
-    for scene in (MIDDLEBURY_2003.load("teddy", {}, data_root), SYNTHETIC.load("weak", {"size": "120x90"}, None)):
+def test_regions_nest(real: Real) -> None:
+    for scene in (
+        MIDDLEBURY_2003.load("teddy", {}, real("middlebury2003/teddy")),
+        SYNTHETIC.load("weak", {"size": "120x90"}, None),
+    ):
         masks = scene.regions
         assert list(masks) == ["all", "nonocc", "occ", "disc", "textureless"]
         np.testing.assert_array_equal(masks["all"], np.isfinite(scene.truth[scene.ref]))
@@ -149,8 +161,8 @@ def test_truth_explains_the_synthetic_views(name: str) -> None:
 @pytest.mark.parametrize(
     ("dataset", "scene"), [(MIDDLEBURY_2001, "tsukuba"), (MIDDLEBURY_2001, "venus"), (MIDDLEBURY_2003, "teddy")]
 )
-def test_truth_explains_the_real_views(data_root: Path, dataset, scene: str) -> None:
-    loaded = dataset.load(scene, {}, data_root)
+def test_truth_explains_the_real_views(real: Real, dataset, scene: str) -> None:
+    loaded = dataset.load(scene, {}, real(f"middlebury{dataset.year}/{scene}"))
     for view in range(loaded.n):
         if view != loaded.ref:
             # on the side of the partner nothing is hidden that the partner sees
@@ -228,8 +240,8 @@ def test_regions_over_views_follow_a_choice_of_views_and_the_others_do_not() -> 
     assert not two["half_occluded"].any()
 
 
-def test_real_scenes_have_regions_over_views(data_root: Path) -> None:
-    scene = MIDDLEBURY_2003.load("teddy", {}, data_root)
+def test_real_scenes_have_regions_over_views(real: Real) -> None:
+    scene = MIDDLEBURY_2003.load("teddy", {}, real("middlebury2003/teddy"))
     masks = scene.scored_regions
     known = np.isfinite(scene.truth[scene.ref])
     np.testing.assert_array_equal(np.any([masks[name] for name in VIEW_REGIONS], axis=0), known)
@@ -257,3 +269,26 @@ def test_real_scenes_have_regions_over_views(data_root: Path) -> None:
 )
 def test_small_regions_do_not_count(pixels: int, known: int, does: bool) -> None:
     assert counts(pixels, known) is does
+
+
+def test_of_sparse_truth_only_what_is_given_is_known() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)
+    truth = np.where(np.random.default_rng(1).random((20, 30)) < 0.2, np.float32(3), np.float32(np.nan))
+    assert is_sparse(truth)
+    assert not is_sparse(np.where(np.arange(30) < 5, np.nan, truth * 0 + 3).astype(np.float32)[:, :0])
+    assert not is_sparse(np.full((20, 30), 3, np.float32))
+    known = np.isfinite(truth)
+    assert list(regions(image, truth, 1, sparse=True)) == ["all"]
+    seen = np.arange(30) * np.ones((20, 1)) > 10
+    found = regions(image, truth, 1, seen, sparse=True)
+    assert list(found) == ["all", "nonocc", "occ", "textureless"]
+    np.testing.assert_array_equal(found["occ"], known & ~seen)
+
+
+def test_view_regions_follow_the_positions_of_the_views() -> None:
+    truth = np.full((2, 20), 2, np.float32)
+    even = view_regions(truth, 0, 4)
+    apart = view_regions(truth, 0, 3, None, (0, 1, 3))
+    np.testing.assert_array_equal(apart["seen_in_all"], even["seen_in_all"])
+    assert apart["seen_in_all"].sum() == 2 * (20 - 6)
+    assert apart["seen_once"].sum() == 2 * 2

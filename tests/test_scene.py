@@ -133,3 +133,26 @@ def test_contradictions_are_refused(change: dict[str, object]) -> None:
 def test_empty_or_unbounded_ranges_are_refused(bounds: tuple[float, float]) -> None:
     with pytest.raises(SceneError):
         Range(*bounds)
+
+
+def test_uneven_steps_are_kept_until_the_chosen_views_are_even() -> None:
+    scene = evolve(make(4), positions=(0, 1, 2, 3.5))
+    assert not scene.is_even
+    assert [scene.steps(view) for view in range(4)] == [-2, -1, 0, 1.5]
+    assert (scene.at(1.5), scene.at(-1), scene.at(2)) == (3, 1, None)
+    assert evolve(make(3), positions=(0, 1, 2)).is_even
+    assert scene.digest not in {make(4).digest, evolve(scene, positions=(0, 1, 2, 3.4)).digest}
+
+    three = scene.choose([0, 2, 3])
+    assert (three.positions, three.disparities, three.pair_steps) == ((0, 2, 3.5), Range(-1, 3), 4)
+    two = scene.choose([2, 3])
+    assert two.is_even
+    assert (two.disparities, two.pair_steps) == (Range(-1.5, 4.5), 4 / 1.5)
+    np.testing.assert_array_equal(two.truth[0], scene.truth[2] * np.float32(1.5))
+    assert scene.choose([0, 1, 2]).is_even
+
+
+@pytest.mark.parametrize("positions", [(0, 1, 1, 2), (1, 2, 3, 5), (0, 1, 3), (0, 2, 1, 3), (0, 1, 2, float("nan"))])
+def test_positions_that_do_not_increase_from_0_are_refused(positions: tuple[float, ...]) -> None:
+    with pytest.raises(SceneError, match="4 numbers that begin with 0 and increase are needed"):
+        evolve(make(4), positions=positions)

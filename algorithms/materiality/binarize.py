@@ -78,14 +78,14 @@ def by_plane(mu: NDArray[np.float32], space: DisparitySpace, view: int, target: 
 
 @kernel
 def _visible_cost(mu, rho, pairs, views, view, first, origin, fineness, hidden, prior, top, end, cost, material):  # type: ignore[no-untyped-def]
-    _, width, planes = cost.shape
+    _, planes, width = cost.shape
     samples = (width - 1) * fineness + 1
     seen = np.empty((views, planes, samples), np.float32)
     one, scale = np.float32(1), np.float32(1 / FULL)
     for y in range(top, end):
         see_row(mu[y], first, origin, one, seen)
-        for x in range(width):
-            for k in range(planes):
+        for k in range(planes):
+            for x in range(width):
                 column = view * (first + k) - origin + x * fineness
                 near = min(k + 1, planes - 1)
                 total, weight = prior * hidden, prior
@@ -100,8 +100,8 @@ def _visible_cost(mu, rho, pairs, views, view, first, origin, fineness, hidden, 
                             both *= seen[j, near, uj]
                         total += both * (one - scale * rho[y, p, k, column])
                         weight += both
-                cost[y, x, k] = total / weight
-                material[y, x, k] = mu[y, k, column]
+                cost[y, k, x] = total / weight
+                material[y, k, x] = mu[y, k, column]
 
 
 def visible_cost(
@@ -131,9 +131,9 @@ def visible_cost(
     Returns
     -------
     cost, material
-        (H, W, planes) float32: the cost, and mu on the same rays.
+        (H, planes, W) float32: the cost, and mu on the same rays.
     """
-    cost = np.empty((space.rows, space.width, space.planes), np.float32)
+    cost = np.empty((space.rows, space.planes, space.width), np.float32)
     material = np.empty_like(cost)
     q, kind = space.fineness, np.float32
 

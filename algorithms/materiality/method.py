@@ -17,6 +17,7 @@ from matbench.algorithms.materiality.edges import edge_weights
 from matbench.algorithms.materiality.objective import Energy
 from matbench.algorithms.materiality.parameters import EnergyTerms, Solver, silent
 from matbench.algorithms.materiality.start import start
+from matbench.algorithms.ray_ends import rays_end_near, seen_near
 from matbench.algorithms.similarity import FULL, Matcher, Matching
 from matbench.parameters import flat
 from matbench.scene import Scene
@@ -86,7 +87,7 @@ class Materiality:
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """The reference view's map, the materialities, and the history of the passes."""
-        matcher = Matcher.of(scene, self.matching)
+        matcher = Matcher.of(scene, self.matching, context.threads)
         return self._descent(matcher, context) if self.solver.descends else self._fixed_point(matcher, context)
 
     def _fixed_point(self, matcher: Matcher, context: Context) -> Estimate:
@@ -95,9 +96,10 @@ class Materiality:
             self._tell_similarities(matcher, matcher.all(threads), probe)
         solver, inference = self.solver, self.inference
         every = inference.comparisons(matcher)
+        ratios = np.ones((space.rows, space.width), np.float32)
         history: dict[str, list[float]] = {"changed": [], "energy_before": [], "energy": []}
         if solver.start == "consensus":
-            maps, compared = inference.initial_maps(matcher, threads), every
+            maps, compared = inference.initial_maps(matcher, threads, ratios), every
             held = inference.volume_bytes(matcher, refined=solver.passes > 0)
         else:
             compared = matcher.comparisons
@@ -109,7 +111,7 @@ class Materiality:
             # a view in which nothing is material ends in the farthest plane
             maps = np.nan_to_num(np.stack([fill_from_background(found) for found in rays]))
         for number in range(solver.passes):
-            found, *energies = inference.refined_maps(matcher, maps, solver.material, threads)
+            found, *energies = inference.refined_maps(matcher, maps, solver.material, threads, ratios)
             compared += every
             changed = float(np.mean(np.abs(found - maps) > 0.5))
             told = dict(zip(history, (changed, *energies), strict=True))
@@ -130,8 +132,13 @@ class Materiality:
         answer = maps[matcher.scene.ref]
         if solid is not None and solver.binarization != "volume":
             answer = self._binarize(matcher, solid, threads)
+        sure = ratios
+        if solver.confidence != "costs" or not solver.infers:
+            ends = rays_end_near(matcher, maps, answer, threads)
+            sure = ends * ratios if solver.confidence == "both" else ends
         return Estimate(
             disparity={self._reference(matcher): matcher.disparity(answer)},
+            confidence={self._reference(matcher): sure},
             volume=None if solid is None else Volume(space, solid, matcher.indices),
             history=history,
             work={"passes": len(history["changed"]), "pair_similarities": compared, "volume_bytes": held},
@@ -163,9 +170,12 @@ class Materiality:
         mu, history, passes, updates = descent.run(energy, mu, tell if probe.active else None)
         fixed = rho.nbytes + mu.nbytes + sum(weights.nbytes for weights in energy.weights)
         by_volume = solver.binarization == "volume"
+        answer = self._infer(matcher, mu, rho, threads)
+        sure = seen_near(seen_rays(mu, space, matcher.scene.ref, threads), answer, threads)
         inferring = self.inference.volume_bytes(matcher, refined=True) if by_volume else 0
         return Estimate(
-            disparity={self._reference(matcher): matcher.disparity(self._infer(matcher, mu, rho, threads))},
+            disparity={self._reference(matcher): matcher.disparity(answer)},
+            confidence={self._reference(matcher): sure},
             volume=Volume(space, mu, matcher.indices),
             history=history,
             work={

@@ -5,6 +5,7 @@ from typing import Literal, get_args
 
 from attrs import field, frozen, validators
 
+from matbench.algorithms.parameters import unread
 from matbench.algorithms.similarity import Matching
 
 Start = Literal["mean", "soft", "consensus"]
@@ -12,6 +13,7 @@ Count = Literal["row", "global"]
 Target = Literal["image", "union"]
 Optimiser = Literal["fixed_point", "gradient", "fista"]
 Binarization = Literal["plane", "ray", "volume"]
+Confidence = Literal["materiality", "costs", "both"]
 
 
 @frozen
@@ -46,6 +48,11 @@ class Solver:
         the maps of the last pass are the answer.
     material
         Weight of mu in the cost of a point, wherever disparities are inferred semi-globally by it.
+    confidence
+        What says how sure an answer is. ``materiality``: the chance that the ray ends there, mu V over the planes
+        within one of the answer; ``costs``: how far the cost of the answer lies below that of the next best plane
+        (`peak_ratio`); or the product of ``both``. A descent of E, and a start that is not passed on, have only the
+        first.
     """
 
     start: Start = field(default="consensus", validator=validators.in_(get_args(Start)))
@@ -55,11 +62,17 @@ class Solver:
     tolerance: float = field(default=0.0, validator=validators.ge(0))
     binarization: Binarization = field(default="volume", validator=validators.in_(get_args(Binarization)))
     material: float = field(default=0.25, validator=validators.ge(0))
+    confidence: Confidence = field(default="costs", validator=validators.in_(get_args(Confidence)))
 
     @property
     def descends(self) -> bool:
         """Whether it is the energy that is minimised."""
         return self.optimiser != "fixed_point"
+
+    @property
+    def infers(self) -> bool:
+        """Whether maps of all views are inferred from costs on the way."""
+        return self.start == "consensus" or (self.passes > 0 and not self.descends)
 
 
 @frozen
@@ -97,7 +110,7 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
     Inference is left out as far as the window decides (`Inference.silent`).
     """
     descends, some = solver.descends, solver.passes > 0
-    infers = solver.start == "consensus" or (some and not descends)
+    infers = solver.infers
     by_volume = descends and solver.binarization == "volume"
     minimises = descends and some
     inference = "start=consensus" if descends else "start=consensus or passes above 0"
@@ -112,6 +125,10 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
             (infers or by_volume, f"{inference} or binarization=volume" if descends else inference),
         ),
         "sharpness": (solver.start == "soft", "start=soft"),
+        "confidence": (
+            infers and not descends,
+            "optimiser=fixed_point" if descends else inference,
+        ),
         "tolerance": (solver.passes >= fewest, f"passes above {fewest - 1}"),
         "material": (by_volume if descends else some, "binarization=volume" if descends else "passes above 0"),
         "target": (
@@ -123,6 +140,6 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
     if minimises:
         takes["counted"] = energy.count > 0 or energy.across == 0, "count above 0 or across=0"
         takes["edge"] = ties, "across or along above 0"
-    found = {name: condition for name, (is_read, condition) in takes.items() if not is_read}
+    found = unread(takes)
     colours = {"colour"} if minimises and ties else set()  # the edges that weaken the ties are those of the colours
     return {name: why for name, why in matching.silent.items() if name not in colours} | found

@@ -4,7 +4,8 @@ Each scene tests one difficulty (see `worlds`). Every scene has options for the 
 `cameras`): ``synthetic/fence[n=5 noise=4 gain=0.2 seed=3]``.
 """
 
-from matbench.datasets.synthetic.scenes import OPTIONS, SYNTHETIC, materiality
+from matbench.datasets.synthetic.asking import OPTIONS
+from matbench.datasets.synthetic.scenes import SYNTHETIC, materiality
 from matbench.datasets.synthetic.worlds import WORLDS
 
 __all__ = ["OPTIONS", "SYNTHETIC", "WORLDS", "materiality"]

@@ -4,8 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
-import tomllib
 import venv
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -14,11 +12,13 @@ from typing import Any, Literal
 
 import numpy as np
 from attrs import frozen
-from filelock import FileLock
 
 from matbench.bench.measuring import ROUNDS, Progress, Tree
 from matbench.bench.turns import Turns, in_turns
-from matbench.errors import UserError
+from matbench.errors import UserError, one_line
+from matbench.files.locking import Busy, held
+from matbench.files.temporary import temporary_folder
+from matbench.files.toml import read_toml
 from matbench.measures.statistics import CONFIDENCE
 from matbench.plans.plugins import kernel_cache
 
@@ -107,7 +107,7 @@ def last_change(code: Path, file: Path) -> str | None:
 
 def _needs(code: Path) -> tuple[Any, ...]:
     """The dependencies that a checkout declares: of Python, of the package, of its tests."""
-    project = tomllib.loads((code / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = read_toml(code / "pyproject.toml", "project file").get("project", {})
     return (
         project.get("requires-python"),
         project.get("dependencies"),
@@ -132,7 +132,7 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
     kept = kernel_cache().parent / digest
     try:
         with ExitStack() as stack:
-            place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="matbench-base-")))
+            place = stack.enter_context(temporary_folder())
             code = stack.enter_context(_folder_alone(kept, place / "code"))
             # git still lists a worktree whose folder a killed run has lost, and refuses to add it again
             _git(here.code, "worktree", "prune")
@@ -149,7 +149,10 @@ def base_tree(here: Tree, digest: str, progress: Progress) -> Iterator[Tree]:
                 _share_libraries(python, code, here)
             else:
                 progress(f"base {digest[:8]}: installing its own libraries")
-                venv.create(environment, symlinks=True, with_pip=True)
+                try:
+                    venv.create(environment, symlinks=True, with_pip=True)
+                except subprocess.CalledProcessError as error:
+                    raise UserError(f"the base's environment could not be made: {one_line(error)}") from error
                 python = _python(environment)
                 _run(python, "-m", "pip", "install", "--quiet", "--editable", f"{code}[test]")
             yield Tree(code, python, kept / "kernels")
@@ -165,19 +168,20 @@ def _folder_alone(kept: Path, else_this: Path) -> Iterator[Path]:
     What a killed process has left in the folder is removed first: the system has released its lock.
     """
     kept.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(kept / ".lock")
-    try:
-        lock.acquire(timeout=0)
-    except (OSError, NotImplementedError):  # another process has it (a `Timeout`), or nothing can be locked there
-        yield else_this
-        return
-    wanted = kept / "code"
-    try:
-        shutil.rmtree(wanted, ignore_errors=True)
-        yield wanted
-    finally:
-        shutil.rmtree(wanted, ignore_errors=True)
-        lock.release()
+    with ExitStack() as stack:
+        try:
+            is_ours = bool(stack.enter_context(held(kept)))
+        except Busy:
+            is_ours = False
+        if not is_ours:  # another process has it, or nothing can be locked there
+            yield else_this
+            return
+        wanted = kept / "code"
+        try:
+            shutil.rmtree(wanted, ignore_errors=True)
+            yield wanted
+        finally:
+            shutil.rmtree(wanted, ignore_errors=True)
 
 
 def _python(environment: Path) -> Path:

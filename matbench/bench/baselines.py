@@ -14,6 +14,7 @@ from matbench.bench import machine
 from matbench.bench.base import Versus
 from matbench.bench.measuring import BENCHMARKS, ROUNDS, Progress, Sitting, Timing, Tree, sit
 from matbench.errors import UserError
+from matbench.files.documents import read_json
 
 MARGIN = 0.15
 """How much slower than the stored code a subject may be, as a share of its time."""
@@ -23,6 +24,8 @@ SUSPECT = 0.1
 
 SITTINGS = 3
 """Processes whose median decides, where the commit that stored a ratio is not at hand."""
+
+_MOST = 1 << 22  # bytes of a baseline
 
 UPDATES = 5
 """Processes when ratios are stored. For each subject the one counts in which the reference was quickest:
@@ -119,7 +122,7 @@ def read(place: Path) -> list[Baseline]:
 
 def _read(path: Path) -> Baseline:
     try:
-        return cattrs.structure(json.loads(path.read_text(encoding="utf-8")), Baseline)
+        return cattrs.structure(read_json(path, most=_MOST), Baseline)
     except Exception as error:
         raise UserError(f"{path} is no stored baseline: delete it, or write it anew with --update") from error
 

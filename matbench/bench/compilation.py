@@ -1,12 +1,11 @@
 """How long compiling all methods takes, in a fresh process without cached kernels. It has a budget of its own."""
 
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 
 from attrs import evolve, frozen
 
 from matbench.bench.measuring import Tree, run_program
+from matbench.files.temporary import temporary_folder
 
 BUDGET = 1.5
 """How many times the stored time compiling may take; if the first measurement is beyond it, the median of three."""
@@ -44,6 +43,6 @@ def compile_all(tree: Tree) -> Compilation:
     UserError
         If a method cannot be compiled.
     """
-    with tempfile.TemporaryDirectory(prefix="matbench-kernels-") as place:
-        found = run_program(evolve(tree, kernels=Path(place)), "compiling")
+    with temporary_folder() as place:
+        found = run_program(evolve(tree, kernels=place), "compiling")
     return Compilation(found["seconds"], found["reference"], found["digest"])

@@ -8,6 +8,9 @@ from collections.abc import Mapping
 
 from matbench.bench.measuring import BENCHMARKS, Tree, run_program
 from matbench.errors import UserError
+from matbench.files.documents import read_json
+
+_MOST = 1 << 22  # bytes of stored counters
 
 Work = Mapping[str, Mapping[str, int]]
 """Method -> counter -> count."""
@@ -29,7 +32,7 @@ def stored(tree: Tree) -> Work:
     """
     path = tree.code / BENCHMARKS / "counters.json"
     try:
-        found: Work = json.loads(path.read_text(encoding="utf-8"))
+        found: Work = read_json(path, most=_MOST)
     except (OSError, ValueError) as error:
         raise UserError(f"{path} cannot be read: matbench bench --update writes it") from error
     return found

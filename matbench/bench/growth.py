@@ -2,33 +2,27 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from fnmatch import fnmatchcase
+from functools import cache
 from typing import Any
 
 import numpy as np
 from attrs import define, evolve, field, frozen
 from numpy.typing import NDArray
 
-from matbench import spec
+from matbench import parameters
 from matbench.algorithm import Algorithm, Context
 from matbench.bench.roofline import Roofline
 from matbench.bench.roofline import measure as measure_roofline
-from matbench.errors import unknown
+from matbench.errors import UserError, unknown
 from matbench.measures.statistics import CONFIDENCE
 from matbench.plans import plugins
 from matbench.scene import Scene
 from matbench.scenes.catalogue import load_scene
 
-METHODS = {
-    "materiality": "materiality[views=0 fineness=1]",
-    "materiality[preset=descent]": "materiality[preset=descent views=0 fineness=1]",
-    "materiality[preset=paper]": "materiality[preset=paper views=0]",
-    "multiview_sgm": "multiview_sgm[views=0 fineness=1]",
-    "okutomi_kanade": "okutomi_kanade[fineness=1]",
-    "voxel_coloring": "voxel_coloring[fineness=1]",
-    "sgbm": "sgbm",
-}
-"""Name -> selector. All methods use every view and whole-pixel planes, so that only the varied size changes."""
+EVEN: Mapping[str, object] = {"views": 0, "fineness": 1}
+"""Every view and whole-pixel planes, for each method that has these parameters: only the varied size changes."""
 
 PEER = "sgbm"
 """The method that stands in every table for comparison: OpenCV's, which everybody knows."""
@@ -117,19 +111,37 @@ class Growth:
         return list(dict.fromkeys(point.method for point in self.points))
 
 
+@cache
+def methods() -> Mapping[str, Algorithm]:
+    """Name -> method, `EVEN`: every built-in one, and each of its presets."""
+    found: dict[str, Algorithm] = {}
+    for name in plugins.built_in_algorithms():
+        plugin = plugins.algorithm(name)
+        known = parameters.parameters(plugin.load())
+        even = {key: value for key, value in EVEN.items() if key in known}
+        found[name] = plugin.make(even)
+        for preset in sorted(parameters.presets_of(plugin.load())):
+            found[f"{name}[preset={preset}]"] = _made(plugin, {"preset": preset}, even)
+    return found
+
+
+def _made(plugin: plugins.Plugin, options: Mapping[str, object], even: Mapping[str, object]) -> Algorithm:
+    """With those of `even` that mean something beside `options`: others are refused."""
+    for key, value in even.items():
+        with suppress(UserError):
+            plugin.make({**options, key: value})
+            options = {**options, key: value}
+    made: Algorithm = plugin.make(options)
+    return made
+
+
 def chosen(patterns: Sequence[str]) -> list[str]:
     """The methods that names or patterns mean; the peer is always added."""
     for pattern in patterns:
-        if not any(pattern == name or fnmatchcase(name, pattern) for name in METHODS):
-            raise unknown("method", pattern, METHODS)
-    wanted = [n for n in METHODS if not patterns or any(n == p or fnmatchcase(n, p) for p in patterns)]
+        if not any(pattern == name or fnmatchcase(name, pattern) for name in methods()):
+            raise unknown("method", pattern, methods())
+    wanted = [n for n in methods() if not patterns or any(n == p or fnmatchcase(n, p) for p in patterns)]
     return wanted if PEER in wanted else [*wanted, PEER]
-
-
-def _instance(name: str) -> Algorithm:
-    (one,) = spec.parse(METHODS[name])
-    made: Algorithm = plugins.algorithm(one.name).make(one.options)
-    return made
 
 
 def _scene(setting: tuple[int, int, int, int]) -> Scene:
@@ -142,7 +154,7 @@ def _scene(setting: tuple[int, int, int, int]) -> Scene:
     return load_scene(f"synthetic/box[size={width}x{height} n={views} disparities=0:{(disparities - 1) * pair_steps}]")
 
 
-def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], None]) -> Growth:
+def measure(names: Sequence[str], seconds: float, progress: Callable[[str], None]) -> Growth:
     """Time every method on every scene, on one thread, in rounds until the time is used up.
 
     In the first round scenes come from the smallest to the largest; those for which no time is left are
@@ -158,9 +170,9 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
     cv2.setNumThreads(1)  # the peer would else use all cores, and the others one
     settings = sorted({s for axis in AXES.values() for s in axis}, key=lambda s: s[0] * s[1] * s[2] * (s[3] - 1))
     scenes: dict[tuple[int, int, int, int], Scene] = {}
-    instances = {name: _instance(name) for name in methods}
+    instances = {name: methods()[name] for name in names}
     progress("compiling")
-    for name in methods:
+    for name in names:
         instances[name].solve(_scene((64, 24, 4, 3)), Context())
     roofline = measure_roofline()
     end = time.monotonic() + seconds  # compiling is not growth
@@ -169,7 +181,7 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
     while number == 0 or time.monotonic() + took < end:
         number, begin = number + 1, time.monotonic()
         for setting in settings:
-            for name in methods:
+            for name in names:
                 point = points.setdefault((name, setting), Point(name, setting))
                 if time.monotonic() > end:
                     continue  # and not break: every point must be there, if only as left out
@@ -180,10 +192,10 @@ def measure(methods: Sequence[str], seconds: float, progress: Callable[[str], No
         # measured again in every round: the machine's limits must come from the same minutes as the times
         roofline = roofline.best(measure_roofline(2))
         took = time.monotonic() - begin
-    left_out = [_left_out(setting, [points[name, setting] for name in methods]) for setting in settings]
+    left_out = [_left_out(setting, [points[name, setting] for name in names]) for setting in settings]
     measured = tuple(point for point in points.values() if point.solves)
     growth = Growth(measured, (), roofline, tuple(filter(None, left_out)))
-    return evolve(growth, fits=tuple(_fits(growth, methods)))
+    return evolve(growth, fits=tuple(_fits(growth, names)))
 
 
 def _left_out(setting: tuple[int, int, int, int], points: Sequence[Point]) -> str:
@@ -209,8 +221,8 @@ def _solve(point: Point, method: Algorithm, scene: Scene) -> None:
         spent += max(took, 1e-4)
 
 
-def _fits(growth: Growth, methods: Sequence[str]) -> Iterator[Fit]:
-    for name in methods:
+def _fits(growth: Growth, names: Sequence[str]) -> Iterator[Fit]:
+    for name in names:
         for axis in AXES:
             curve = growth.of(name, axis)
             if len(curve) > 2:  # two points fit any line: there would be no interval

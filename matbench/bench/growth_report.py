@@ -1,12 +1,14 @@
 """How time grows, as tables and as a log-log figure with the counted work beside the measured time."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
+from matbench import drawing
 from matbench.bench.growth import AXES, PEER, Growth
 from matbench.bench.tables import Table, seconds
+from matbench.files.csv_tables import csv_text
 
 # Okabe & Ito 2008: told apart by all kinds of eyes
 _COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#cc79a7", "#e69f00", "#d55e00", "#000000")
@@ -76,14 +78,13 @@ def write_growth(growth: Growth, folder: Path) -> list[Path]:
     """Write ``growth.csv``, ``growth.png`` and ``growth.pdf`` into a folder; their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     table = folder / "growth.csv"
-    with table.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(("method", "width", "height", "disparities", "views", "seconds", "solves", "counter", "count"))
-        for point in growth.points:
-            rows.writerow((point.method, *point.setting, f"{point.seconds:.6g}", point.solves, *point.counter))
+    heads = ["method", "width", "height", "disparities", "views", "seconds", "solves", "counter", "count"]
+    rows = [(p.method, *p.setting, f"{p.seconds:.6g}", p.solves, *p.counter) for p in growth.points]
+    table.write_text(csv_text(pd.DataFrame(rows, columns=heads)), encoding="utf-8")
     return [table, *_draw(growth, folder)]
 
 
+@drawing.style()
 def _draw(growth: Growth, folder: Path) -> list[Path]:
     from matplotlib.figure import Figure
 

@@ -6,7 +6,6 @@ import os
 import runpy
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -16,7 +15,10 @@ import numpy as np
 from attrs import frozen
 
 from matbench.errors import UserError, unknown
+from matbench.files.documents import read_json
+from matbench.files.temporary import temporary_folder
 from matbench.measures.statistics import median_interval
+from matbench.plans import kernels
 from matbench.plans.plugins import kernel_cache
 
 BENCHMARKS = Path("tests", "benchmarks")
@@ -25,6 +27,7 @@ ROUNDS, PARTS = 25, 3
 # bytes: malloc keeps freed blocks up to this size instead of giving them back to the system. Else every round
 # would get fresh pages, and the time would be mostly that of the system clearing them.
 _LARGEST = str(2**30)
+_MOST = 1 << 28  # bytes of what a sitting measured
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -118,7 +121,7 @@ def environment(tree: Tree) -> dict[str, str]:
     kept = {"MALLOC_MMAP_THRESHOLD_": _LARGEST, "MALLOC_TRIM_THRESHOLD_": _LARGEST, "PYTHONHASHSEED": "0"}
     threads = dict.fromkeys(_ONE_THREAD, "1")
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
-    return {**inherited, **threads, **kept, "NUMBA_CACHE_DIR": str(tree.kernels)}
+    return {**inherited, **threads, **kept, kernels.VARIABLE: str(tree.kernels)}
 
 
 def _pytest(tree: Tree, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -161,8 +164,8 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS) -> Sitting:
     UserError
         If the process measured nothing, or measured other code than the tree's.
     """
-    with tempfile.TemporaryDirectory(prefix="matbench-bench-") as place:
-        written = Path(place, "benchmarks.json")
+    with temporary_folder() as place:
+        written = place / "benchmarks.json"
         done = _pytest(
             tree,
             f"--benchmark-min-rounds={-(-rounds // PARTS)}",
@@ -171,7 +174,7 @@ def sit(tree: Tree, names: Sequence[str], rounds: int = ROUNDS) -> Sitting:
             *(f"--subject={name}" for name in names),
         )
         try:
-            found: dict[str, Any] = json.loads(written.read_text(encoding="utf-8"))
+            found: dict[str, Any] = read_json(written, most=_MOST)
             measured = found["measured"]
         except (OSError, ValueError, KeyError):
             raise UserError(f"nothing was measured in {tree.code}: {_last_line(done)}") from None

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import isnan
 
+import pandas as pd
 from attrs import frozen
 from rich import box
 from rich.table import Table as RichTable
@@ -36,10 +37,12 @@ class Table:
 
     def markdown(self) -> str:
         """The table for a job summary."""
-        sides = ["---"] * self.words + ["--:"] * (len(self.heads) - self.words)
-        lines = [self.heads, sides, *self.rows]
-        escaped = ("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
-        return f"**{self.title}**\n\n" + "\n".join(escaped) + "\n" + "".join(f"\n{note}\n" for note in self.notes)
+        rows = [[cell.replace("|", "\\|") for cell in row] for row in self.rows]
+        sides = ["left"] * self.words + ["right"] * (len(self.heads) - self.words)
+        body = pd.DataFrame(rows, columns=list(self.heads)).to_markdown(
+            index=False, disable_numparse=True, colalign=sides
+        )
+        return f"**{self.title}**\n\n{body}\n" + "".join(f"\n{note}\n" for note in self.notes)
 
 
 def seconds(value: float) -> str:

@@ -1,12 +1,13 @@
 """`matbench ablate`: what each switch of a method does, all else equal."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 from attrs import evolve
 from cyclopts import App
 
-from matbench.commands.options import DEFAULTS, Options, check_metric, is_of_volumes, many, whole
+from matbench.commands.options import DEFAULTS, Options, many, need_volumes, whole
 
 app = App(name="ablate", help_epilogue="", help_format="markdown")
 
@@ -32,6 +33,8 @@ def ablate(
 
     `matbench ablate algorithms/ablations/pairs.toml --data DATA`
 
+    `matbench ablate 'materiality[pairs=all,consecutive]' --until decided --budget 10m`
+
     `matbench ablate 'materiality[views=0]' -s 'middlebury*/*[views=2,3,5,7,9]' --data DATA`
 
     Parameters
@@ -45,23 +48,27 @@ def ablate(
     from matbench.plans.request import read_request
     from matbench.results import ablation
 
-    check_metric(options.metric, options.plugin)
+    settings = options.settings
     algorithms: list[str] = [selector]
     if selector.endswith(".toml"):
         algorithms, listed = read_request(Path(selector))
         scene = scene or listed
     chosen = methods(algorithms, options.plugin)
     ablation.check_varies(chosen, scene or ())
-    ready = comparison.prepare(
+    prepare = partial(
+        comparison.prepare,
         algorithms,
-        scene,
-        settings=evolve(options.settings, volumes=is_of_volumes(options.metric, options.plugin)),
+        settings=evolve(settings, volumes=need_volumes(settings.metrics, options.plugin)),
         out=options.out,
         seed=options.seeds,
         plugin=options.plugin,
         repeats=whole("repeats", options.repeats),
         write=not options.dry_run,
     )
-    if options.dry_run:
-        return running.show_plan(ready, options)
-    return running.work(ready, options, is_ablation=any(ablation.factors(chosen).values()))
+    is_ablation = any(ablation.factors(chosen).values())
+    if options.grows:
+        from matbench.commands import growing
+
+        return growing.work(prepare, growing.names(scene, options), options, is_ablation)
+    ready = prepare(scene)
+    return running.show_plan(ready, options) if options.dry_run else running.work(ready, options, is_ablation)

@@ -1,8 +1,6 @@
 """`matbench bench`: is it as fast as it was, is it faster than another commit, and how does its time grow?"""
 
-import json
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +10,7 @@ import attrs
 from attrs import field, frozen
 from cyclopts import App, Parameter
 
-from matbench.commands.console import DONE, FAILED, Console
+from matbench.commands.console import DONE, FAILED, Console, print_json, print_text
 from matbench.errors import UserError
 
 REGRESSION = 3
@@ -131,7 +129,7 @@ class _Output:
 
     def table(self, table: Any) -> None:
         if self._choice.markdown:
-            print(table.markdown())
+            print_text(table.markdown())
         elif not self._choice.as_json:
             self._console.print(table.rich())
             for note in (*table.notes, ""):
@@ -146,8 +144,8 @@ class _Output:
     def progress(self) -> Iterator[Callable[[str], None]]:
         """Show progress on the error stream: a status line in a terminal, elsewhere one line for each step."""
         beside = Console(stderr=True)
-        if beside.is_terminal:
-            with beside.status("starting") as status:
+        if beside.is_interactive:
+            with beside.busy("starting") as status:
                 yield status.update
         else:
             said = [""]
@@ -155,13 +153,13 @@ class _Output:
             def tell(line: str) -> None:
                 if (step := line.partition(":")[0]) != said[-1]:
                     said.append(step)
-                    print(f"bench: {line}", file=sys.stderr)
+                    beside.say(f"bench: {line}")
 
             yield tell
 
     def close(self) -> None:
         if self._choice.as_json:
-            print(json.dumps(_plain(self.document), indent=1))
+            print_json(_plain(self.document))
 
 
 def _plain(value: Any) -> Any:
@@ -352,9 +350,9 @@ def _against(
 
 def _grow(choice: Choice, seconds: float, out: Path | None, output: _Output) -> int:
     """Measure and print how time grows with pixels, disparities and views."""
-    from matbench.plans.plugins import kernel_cache
+    from matbench.plans import kernels, plugins
 
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))  # numba reads it when it is imported
+    os.environ.setdefault(kernels.VARIABLE, str(plugins.kernel_cache()))  # numba reads it when it is imported
     from matbench.bench import growth, growth_report
 
     methods = growth.chosen(choice.only)

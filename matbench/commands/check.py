@@ -1,6 +1,5 @@
 """`matbench check`: does a method keep its promises to the harness?"""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Column, Table
 
 from matbench import spec
-from matbench.commands.console import DONE, FAILED, Console
+from matbench.commands.console import DONE, FAILED, Console, print_json
 from matbench.commands.options import Plugins
 from matbench.errors import UserError
 from matbench.plans import limits, plugins
@@ -65,7 +64,7 @@ def check(
     console = Console()
     results: list[tuple[Method, list[CheckResult]]] = []
     columns = (BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
-    shown = console.is_terminal and not as_json
+    shown = console.is_interactive and not as_json
     for one in ready:
         with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
             task = progress.add_task("starting", total=None)
@@ -78,9 +77,7 @@ def check(
             console.print(_table(*results[-1]))
             console.say(_summary(*results[-1]))
     if as_json:
-        print(
-            json.dumps([{"method": str(one), "checks": [asdict(f) for f in found]} for one, found in results], indent=1)
-        )
+        print_json([{"method": str(one), "checks": [asdict(f) for f in found]} for one, found in results])
     return DONE if all(_passes(found) for _, found in results) else FAILED
 
 

@@ -1,11 +1,12 @@
 """`matbench compare`: run methods on scenes, score them, write tables and a report."""
 
+from functools import partial
 from typing import Annotated
 
 from attrs import evolve
 from cyclopts import App, Parameter
 
-from matbench.commands.options import DEFAULTS, Options, check_metric, is_of_volumes, many, whole
+from matbench.commands.options import DEFAULTS, Options, many, need_volumes, whole
 from matbench.errors import UserError
 from matbench.plans.record_option import RecordOption
 
@@ -17,7 +18,7 @@ def compare(
     *,
     algorithm: Annotated[
         list[str] | None,
-        many("-a", "--algorithm", "Method, such as `sgbm` or `materiality[pairs=all,consecutive]`; default all."),
+        many("-a", "--algorithm", "Method, such as `sgbm` or `materiality[pairs=all,consecutive]`; default seven."),
     ] = None,
     scene: Annotated[
         list[str] | None,
@@ -45,8 +46,8 @@ def compare(
 ) -> int:
     """Run methods on scenes, score them, and write tables and a report.
 
-    Without arguments: all built-in methods on three synthetic scenes and on the paper's three where
-    the data folder has them. The same line typed again takes up where it was interrupted.
+    Without arguments: seven methods (`matbench list` says which others there are) on twelve small random worlds, and
+    on the paper's three where the data folder has them. The same line typed again takes up where it was interrupted.
 
     **Examples**
 
@@ -79,6 +80,10 @@ def compare(
 
     `matbench compare --dask tcp://head:8786`
 
+    As many worlds as it takes to tell the first two methods apart, for ten minutes at most:
+
+    `matbench compare -a materiality -a multiview_sgm --until decided --budget 10m`
+
     In a script, where the exit status tells 0 all well, 1 cells failed, 2 wrong usage, 130 interrupted:
 
     `matbench compare -a sgbm -s synthetic/box --json`
@@ -87,18 +92,18 @@ def compare(
     from matbench.commands import running
     from matbench.scenes.catalogue import default_scenes
 
-    check_metric(options.metric, options.plugin)
+    settings = options.settings
     if row is not None and record is None:
         raise UserError(f"--row {row} chooses what recordings show: add --record")
-    if scene is None:
+    if scene is None and not options.grows:
         running.say_missing(default_scenes(options.data)[1], options)
-    ready = comparison.prepare(
+    prepare = partial(
+        comparison.prepare,
         algorithm,
-        scene,
         settings=evolve(
-            options.settings,
+            settings,
             record=None if record is None else RecordOption.of(record, row),
-            volumes=volumes or is_of_volumes(options.metric, options.plugin),
+            volumes=volumes or need_volumes(settings.metrics, options.plugin),
         ),
         out=options.out,
         seed=options.seeds,
@@ -106,4 +111,9 @@ def compare(
         repeats=whole("repeats", options.repeats),
         write=not options.dry_run,
     )
+    if options.grows:
+        from matbench.commands import growing
+
+        return growing.work(prepare, growing.names(scene, options), options)
+    ready = prepare(scene)
     return running.show_plan(ready, options) if options.dry_run else running.work(ready, options)

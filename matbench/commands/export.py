@@ -30,7 +30,7 @@ def export(
     run: Path,
     /,
     *,
-    out: Annotated[Path | None, Parameter(help="The archive; default beside the run folder.")] = None,
+    out: Annotated[Path | None, Parameter(help="The archive; default beside the run folder, else here.")] = None,
 ) -> int:
     """Write plan, maps, tables, report and a digest of each into one archive; the same run gives the same bytes.
 

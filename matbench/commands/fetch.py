@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn
 
 from matbench.commands.console import DONE, FAILED, INTERRUPTED, Console
+from matbench.commands.streams import spare_output
 from matbench.errors import UserError
 from matbench.files.transfer import PATIENCE, Patience
 from matbench.scenes.dataset import Download
@@ -112,9 +113,10 @@ def _plan(console: Console, looked: Sequence[Result], site: str | None) -> None:
 
 def _fetch(console: Console, chosen: Sequence[Download], root: Path, site: str | None, patience: Patience) -> int:
     """Fetch scenes with progress shown, and print a summary; the exit status."""
+    spare_output()
     results: list[Result] = []
     columns = (BarColumn(24), TextColumn("{task.description}"), DownloadColumn(), TransferSpeedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+    with Progress(*columns, console=console, transient=True, disable=not console.is_interactive) as progress:
         task = progress.add_task("starting", total=None)
 
         def listen(event: Event, what: str, done: int, total: int | None) -> None:

@@ -1,7 +1,6 @@
 """`matbench list`: methods with parameters, scenes with sizes, metrics, regions."""
 
 import inspect
-import json
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import groupby
@@ -13,13 +12,15 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from matbench import parameters
-from matbench.commands.console import DONE, Console
+from matbench.commands.console import DONE, Console, print_json
 from matbench.commands.options import Data, Plugins
 from matbench.errors import UserError
+from matbench.measures.benchmarks import SETS
+from matbench.measures.families import AT, Family
 from matbench.plans import plugins
 from matbench.regions import REGIONS
-from matbench.results import scores
-from matbench.scenes.catalogue import listings
+from matbench.results import metric_catalogue
+from matbench.scenes.catalogue import listings, sets
 
 app = App(
     name="list",
@@ -50,7 +51,7 @@ def list_(
     """Show algorithms with their parameters, scenes with their sizes, and metrics."""
     everything = known(data, plugin)
     if as_json:
-        print(json.dumps(everything, indent=1))
+        print_json(everything)
     else:
         console = Console()
         for table in tables(everything):
@@ -68,10 +69,23 @@ def _known(data: Path | None, files: Sequence[Path]) -> dict[str, Any]:
     return {
         "algorithms": {name: _algorithm(plugin) for name, plugin in sorted(plugins.algorithms(files).items())},
         "scenes": {name: _scene(found) for name, found in listings(data).items()},
-        "metrics": {m.name: {"unit": m.unit, "better": m.better, "about": m.about} for m in scores.metrics()}
-        | {name: {"error": error} for name, error in scores.broken_metrics().items()},
+        "sets": {name: list(scenes) for name, scenes in sorted(sets().items())},
+        "metrics": {m.name: {"unit": m.unit, "better": m.better, "about": m.about} for m in metric_catalogue.metrics()}
+        | {family.name: _family(family) for family in metric_catalogue.families()}
+        | {name: {"error": error} for name, error in metric_catalogue.broken_metrics().items()},
+        "metric_sets": {name: {"about": one.about, "metrics": list(one.metrics)} for name, one in SETS.items()},
         "regions": REGIONS,
     }
+
+
+def _family(family: Family) -> dict[str, Any]:
+    """A family of metrics, as its metric of the largest number describes itself."""
+    facts: dict[str, Any] = {"unit": "", "better": "", "about": family.about}
+    with suppress(UserError):
+        one = family.named(family.name.replace(AT, f"{family.most:g}"))
+        facts |= {"unit": one.unit, "better": one.better}
+    possible = f"{AT} a number from {family.least:g} to {family.most:g}"
+    return facts | {"about": f"{family.about}; {possible}", "least": family.least, "most": family.most}
 
 
 def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
@@ -96,6 +110,7 @@ def _algorithm(plugin: plugins.Plugin) -> dict[str, Any]:
             for name, one in known.items()
         },
         "reads": _reads(plugin, cls),
+        "by_default": plugin.name in plugins.default_algorithms(),
     }
 
 
@@ -119,6 +134,7 @@ def _scene(found: Any) -> dict[str, Any]:
         "sizes": {k: list(v) for k, v in found.sizes.items()},
         "truth": found.truth,
         "present": found.present,
+        "endless": found.endless,
     }
 
 
@@ -134,6 +150,7 @@ def tables(everything: dict[str, Any]) -> list[Table]:
             lines += [f" {group.replace('_', ' ')}:"] if group else []
             lines += [f"  {key}={_shown(one['default'])}: {one['type']}" for key, one in members]
         lines += [f"  reads {file}" for file in facts["reads"]]
+        lines += [] if facts["by_default"] else ["  runs when it is named"]
         methods.add_row(escape(name), escape("\n".join(lines)))
     scenes = Table(
         Column("scene", no_wrap=True),
@@ -153,17 +170,27 @@ def tables(everything: dict[str, Any]) -> list[Table]:
         dims = {size: f"{w}x{h}" if w else "" for size, (w, h) in facts["sizes"].items()}
         sizes = ", ".join(" ".join(dict.fromkeys((size, wide))).strip() for size, wide in dims.items())
         truth, present = ("yes" if facts[key] else "no" for key in ("truth", "present"))
-        scenes.add_row(escape(name), str(facts["views"]), sizes, truth, present)
+        scenes.add_row(
+            escape(f"{name}[seed=0]") if facts["endless"] else escape(name), str(facts["views"]), sizes, truth, present
+        )
+    groups = Table(
+        "set", "scenes", "the first", "the last", title="Sets: names for several scenes", title_justify="left"
+    )
+    for name, names in everything["sets"].items():
+        groups.add_row(*(escape(text) for text in (name, str(len(names)), *(names[k] for k in (0, -1) if names))))
     metrics = Table("metric", "unit", "better", "about", title="Metrics", title_justify="left")
     for name, facts in everything["metrics"].items():
         if "error" in facts:
             metrics.add_row(escape(name), "", "", f"[red]{escape(facts['error'])}[/]")
             continue
         metrics.add_row(escape(name), facts["unit"], facts["better"], escape(facts["about"]))
+    reported = Table("--metrics", "benchmark and metrics", title="Metrics of benchmarks", title_justify="left")
+    for name, facts in everything["metric_sets"].items():
+        reported.add_row(escape(name), escape(f"{facts['about']}: {', '.join(facts['metrics'])}"))
     regions = Table("region", "which pixels of the reference view", title="Regions", title_justify="left")
     for name, about in everything["regions"].items():
         regions.add_row(name, about)
-    return [methods, scenes, metrics, regions]
+    return [methods, scenes, groups, metrics, reported, regions]
 
 
 def _shown(value: Any) -> str:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from attrs import field, frozen
 from cyclopts import Parameter
@@ -24,6 +24,18 @@ Plugins = Annotated[
         show_default=False,
         help="Python file with methods, scenes or metrics of your own; may be repeated.",
     ),
+]
+Metrics = Annotated[
+    list[str],
+    Parameter(
+        name=["--metric", "-m"],
+        negative="",
+        show_default=False,
+        help="Metric of the printed tables, such as `bad_0.25`; may be repeated; `matbench list` names all.",
+    ),
+]
+MetricSet = Annotated[
+    str | None, Parameter(name="--metrics", help="What a benchmark reports: `eth3d`, `hci`, `kitti` or `middlebury`.")
 ]
 
 
@@ -46,9 +58,8 @@ class Options:
         ),
     ] = field(factory=lambda: ["0"])
     plugin: Plugins = field(factory=list)
-    metric: Annotated[
-        str, Parameter(name=["--metric", "-m"], help="Metric of the printed tables; `matbench list` names all.")
-    ] = "total_bad_1"
+    metric: Metrics = field(factory=list)
+    metrics: MetricSet = None
     timeout: Annotated[
         str, Parameter(help="Seconds that each cell may take, reading, warm-up and recording included; or none.")
     ] = f"{limits.HOUR:g}"
@@ -82,6 +93,21 @@ class Options:
             help="Solve again, at the end and one by one, cells that other cells or programs disturbed.",
         ),
     ] = False
+    until: Annotated[
+        Literal["decided"] | None,
+        Parameter(help="Add scenes, in order, until the difference between the first two methods is decided."),
+    ] = None
+    budget: Annotated[str, Parameter(help="Time after which --until ends all the same, such as 10m.")] = "none"
+    published: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            help="Show scores as published, in grey and not ranked, beside those of the very same two views and range.",
+        ),
+    ] = False
+    against: Annotated[
+        Path | None, Parameter(help="Folder of an earlier run of the same scenes: also tell what has changed since.")
+    ] = None
     repeats: Annotated[str, Parameter(help="Solve every cell so often: does a method repeat itself?")] = "1"
     dry_run: Annotated[bool, Parameter(negative="", help="Only say what would run, and why.")] = False
     quiet: Annotated[
@@ -116,7 +142,17 @@ class Options:
             dask=self.dask,
             only=self.only,
             steady=self.steady,
+            published=self.published,
+            metrics=asked_metrics(self.metric, self.metrics, self.plugin),
+            against=self.against,
         )
+
+    @property
+    def grows(self) -> bool:
+        """Are scenes added as the run goes?"""
+        if self.until is None and self.budget != "none":
+            raise UserError(f"--budget {self.budget} ends what --until decided goes on with: add that, too")
+        return self.until is not None
 
     @property
     def seeds(self) -> list[int]:
@@ -133,19 +169,27 @@ def whole(name: str, text: str) -> int:
     return int(text)
 
 
-def check_metric(metric: str, files: Sequence[Path] = ()) -> None:
-    """Raise UserError where no metric has that name, in the users' own files neither."""
+def asked_metrics(names: Sequence[str], of: str | None = None, files: Sequence[Path] = ()) -> tuple[str, ...]:
+    """The names of the metrics that are asked for: those named, then those of a benchmark's set; each once.
+
+    Raises
+    ------
+    UserError
+        If no metric has such a name, in the users' own files neither, or there is no such set.
+    """
+    from matbench.measures.benchmarks import set_named
     from matbench.plans.plugins import using
-    from matbench.results import scores
+    from matbench.results import metric_catalogue
+
+    every = [*names, *(set_named(of).metrics if of is not None else ())]
+    with using(files):
+        return tuple(dict.fromkeys(metric_catalogue.metric_named(name).name for name in every))
+
+
+def need_volumes(metrics: Sequence[str], files: Sequence[Path] = ()) -> bool:
+    """Does one of these metrics score volumes? Then they must be kept."""
+    from matbench.plans.plugins import using
+    from matbench.results import metric_catalogue
 
     with using(files):
-        scores.metric_named(metric)
-
-
-def is_of_volumes(metric: str, files: Sequence[Path] = ()) -> bool:
-    """Does this metric score volumes? Then they must be kept."""
-    from matbench.plans.plugins import using
-    from matbench.results import scores
-
-    with using(files):
-        return scores.of_volumes(metric)
+        return any(map(metric_catalogue.of_volumes, metrics))

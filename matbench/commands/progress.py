@@ -51,7 +51,7 @@ class Progress:
         self._waiting = {cell.key: cell for cell in self.todo}
 
     def __enter__(self) -> "Progress":
-        if self.console is not None and self.console.is_terminal and self.todo:
+        if self.console is not None and self.console.is_interactive and self.todo:
             self._live = Live(console=self.console, get_renderable=self._shown, refresh_per_second=4, transient=True)
             self._live.start()
         return self
@@ -116,9 +116,17 @@ class Progress:
         left = self.seconds_left()
         if left is not None:
             said.append(f"about {duration(left)} left")
+        elif not self._running and not self._ended:  # kernels are compiled, keepers are started
+            said.append("getting ready")
+        text = " · ".join(said)
         head = Table.grid(padding=(0, 1))
-        head.add_row(ProgressBar(total=max(total, 1), completed=self.done, width=_BAR), _line(" · ".join(said)))
+        head.add_row(ProgressBar(total=max(total, 1), completed=self.done, width=self._bar(text)), _line(text))
         return Group(head, *_named(self._running.values(), self.clock()))
+
+    def _bar(self, text: str) -> int:
+        """Columns of the bar: in a narrow terminal the words beside it are worth more than its length."""
+        room = _BAR if self.console is None else self.console.width - len(text) - 1
+        return max(1, min(_BAR, room))
 
 
 def _named(running: Iterable[tuple[Cell, float]], now: float) -> list[Text]:

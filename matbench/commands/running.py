@@ -1,32 +1,31 @@
 """What `compare` and `ablate` share: run a comparison with progress, print its tables, write its report."""
 
-import json
-import math
 import shlex
 import signal
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from attrs import frozen
 
-from matbench.commands.console import DONE, FAILED, INTERRUPTED, Console
+from matbench.commands import json_document
+from matbench.commands.console import DONE, FAILED, INTERRUPTED, Console, complain, print_json, print_text
 from matbench.commands.options import Options
 from matbench.commands.progress import Progress
-from matbench.comparison import Comparison
-from matbench.measures.metrics import Better
+from matbench.commands.streams import spare_output
 from matbench.plans.limits import crowded
 from matbench.plans.plugins import using
-from matbench.reports import costs, curves, tables, terminal
+from matbench.prepared import Comparison
+from matbench.reports import changes, curves, published, tables, terminal
 from matbench.reports import switches as effects
-from matbench.results import scores
 from matbench.results.freshness import PAGE
+from matbench.results.metric_catalogue import better
 from matbench.results.scores import Tables
 from matbench.runs.lock import locked
 from matbench.runs.outcome import FINAL
-from matbench.runs.store import FolderLost
+from matbench.runs.stopped import Stopped
 from matbench.runs.todo import Todo, explained
 from matbench.scenes.catalogue import DATA_VARIABLE, data_root
 
@@ -62,33 +61,45 @@ class Voice:
 
     def busy(self, what: str) -> AbstractContextManager[object]:
         """A context that shows, in a terminal, what is being done."""
-        return nullcontext() if self.talk is None or not self.talk.is_terminal else self.talk.status(what)
+        return nullcontext() if self.talk is None or not self.talk.is_interactive else self.talk.busy(what)
 
 
 def work(ready: Comparison, options: Options, is_ablation: bool = False) -> int:
     """Run, print and report a comparison; the exit status."""
     voice = Voice.of(options)
+    say_remarks(ready, voice)
+    with locked(ready.folder), told_to_end() as write_undisturbed:
+        try:
+            todo = ready.pending()
+            stopped = run(ready, todo, voice)
+            write_undisturbed()
+            kept = ready.kept(todo, is_ablation)
+            cells = publish(ready, is_ablation, voice, stopped, kept)
+        except (Stopped, OSError) as error:
+            return stopped_by(error, ready)
+    if stopped:
+        voice.say("interrupted: the same command goes on from here")
+        return INTERRUPTED
+    return DONE if cells["status"].isin(FINAL).all() else FAILED
+
+
+def stopped_by(error: Stopped | OSError, ready: Comparison) -> int:
+    """Say what stops a run; an OSError comes where cells were written, but the disk has no room for the tables."""
+    complain(f"stopped: {error if isinstance(error, Stopped) else Stopped.of(ready.folder, error)}")
+    return FAILED
+
+
+def say_remarks(ready: Comparison, voice: Voice) -> None:
+    """Print what a reader must know before the run."""
+    if (earlier := ready.settings.against) is not None:
+        for name in ready.shared_with(earlier).others:
+            voice.say(f"{name}: {str(earlier)!r} has it not, or as another scene")
     for reason, scenes in ready.left_out.items():
         voice.say(f"without {', '.join(scenes)}: {reason}")
     for remark in ready.remarks:
         voice.say(remark)
     if ready.settings.dask is None and (crowd := crowded(ready.settings.jobs, ready.settings.threads_each())):
         voice.say(crowd)
-    with locked(ready.folder), _ended_as_by_ctrl_c():
-        try:
-            todo = ready.pending()
-            stopped = _run(ready, todo, voice)
-            cells = publish(ready, options.metric, is_ablation, voice, stopped, ready.kept(todo, is_ablation))
-        except FolderLost as error:
-            print(f"matbench: stopped: {error}", file=sys.stderr)
-            return FAILED
-        except OSError as error:  # cells were written, but the disk has no room for the tables
-            print(f"matbench: stopped: {FolderLost.of(ready.folder, error)}", file=sys.stderr)
-            return FAILED
-    if stopped:
-        voice.say("interrupted: the same command goes on from here")
-        return INTERRUPTED
-    return DONE if cells["status"].isin(FINAL).all() else FAILED
 
 
 def show_plan(ready: Comparison, options: Options) -> int:
@@ -103,10 +114,10 @@ def show_plan(ready: Comparison, options: Options) -> int:
             "stale": stale,
             "left_out": {reason: list(scenes) for reason, scenes in ready.left_out.items()},
         }
-        print(json.dumps(facts, indent=1))
+        print_json(facts)
         return DONE
     if options.quiet:
-        print(ready.folder)
+        print_text(str(ready.folder))
         return DONE
     console = Console()
     for reason, scenes in ready.left_out.items():
@@ -123,12 +134,13 @@ def show_plan(ready: Comparison, options: Options) -> int:
 
 def publish(
     ready: Comparison,
-    metric: str,
     is_ablation: bool,
     voice: Voice,
     stopped: bool = False,
     kept: Tables | None = None,
     say_paths: bool = True,
+    scored: Tables | None = None,
+    more: Mapping[str, Any] | None = None,
 ) -> Any:
     """Score the run, write and print its tables, write its report; returns the table of cells.
 
@@ -136,22 +148,27 @@ def publish(
     ----------
     kept
         Tables that lie there with their page, and are what would be written (`Comparison.kept`).
+    scored
+        Tables that lie there, but whose page is still to be drawn.
+    more
+        What else the document of ``--json`` holds.
     """
     with using(ready.files):
-        return _publish(ready, metric, is_ablation, voice, stopped, kept, say_paths)
+        return _publish(ready, is_ablation, voice, stopped, kept, say_paths, scored, more or {})
 
 
 def _publish(
     ready: Comparison,
-    metric: str,
     is_ablation: bool,
     voice: Voice,
     stopped: bool,
     kept: Tables | None,
     say_paths: bool,
+    scored: Tables | None,
+    more: Mapping[str, Any],
 ) -> Any:
     with voice.busy("scoring"):
-        found = ready.tables() if kept is None else kept
+        found = kept or scored or ready.tables()
         results, cells = found.results, found.cells
         sweeps = ready.sweeps(results)
         switches = ready.ablation(results) if is_ablation else None
@@ -164,14 +181,29 @@ def _publish(
         written["curves"] = ready.folder / "sweeps.csv"
     if is_ablation:
         written["ablation"] = ready.folder / "ablation.csv"
-    metric = _measured(results, metric, voice)
+    shown = _measured(results, ready, voice)
+    against = ready.settings.against
+    changed = None if against is None else ready.changes(results, against)
+    if changed is not None:
+        written["changes"] = ready.folder / "changes.csv"
     if voice.as_json:
-        print(json.dumps(document(ready, results, cells, metric, written, stopped), indent=1, allow_nan=False))
+        since = {} if changed is None else {"against": json_document.since(against, changed[1])}
+        print_json({**json_document.document(ready, results, cells, shown, written, stopped), **since, **more})
     elif voice.talk is None:
         _say_failed(cells)
-        print(ready.folder)
+        print_text(str(ready.folder))
     else:
-        _print_tables(results, cells, switches, sweeps, metric, voice.talk)
+        spare_output()
+        if len(shown) > 1 and not ready.settings.metrics:
+            voice.say("shown is what the scenes' benchmark reports: -m or --metrics shows something else")
+        _print_tables(results, cells, switches, sweeps, shown, voice.talk)
+        if changed is not None:
+            for name in shown:
+                for table in changes.terminal(changed[0], changed[1], name, better(name), str(against)):
+                    voice.talk.print(table)
+        if (beside := ready.page.beside(found)) is not None:
+            for table in published.terminal(beside):
+                voice.talk.print(table)
         if results.empty:
             voice.say(tables.none_scored(cells))
         for line in found.unsteady:
@@ -194,71 +226,10 @@ def _say_paths(ready: Comparison, written: dict[str, Path], voice: Voice) -> Non
         voice.say(f"{stale} stored cells are of other code or pixels: {prune} removes them")
 
 
-def document(
-    ready: Comparison, results: Any, cells: Any, metric: str, written: dict[str, Path], stopped: bool
-) -> dict[str, Any]:
-    """The document of `--json`: the run folder, the status of its cells, and the rows of the summary.
-
-    Keys: ``folder``; ``files``, what was written; ``interrupted``; ``cells``, status -> how many; ``unscored``,
-    each cell without a score with its reason; ``left_out``, why -> scenes; ``metric``; ``table``, the methods, best
-    first, with their means over the scenes they share in ``regions``, ``avg`` (pixels of the pair, in `all`) and
-    ``seconds``; null where there is no number. ``counted``: region -> how many scenes its means are over. Of each
-    method also ``answered``: region -> per cent of the pixels that its mean is over; ``answers``: per cent of the
-    pixels of `all` that it answers; ``seconds_ranked``: may its seconds be compared? and ``remark``: why it is not
-    ranked, and what it leaves unanswered. ``clock``: whose seconds these are.
-    """
-    regions, scope = tables.summarised(results), tables.shared(results, cells)
-    counted = {region: tables.count(tables.per_scene(results, region, metric), scope) for region in regions}
-    answered = {region: tables.means(results, scope, region, metric, "answered") for region in regions}
-    rows = [
-        {
-            "method": str(method),
-            "ranked": bool(row["ranked"]),
-            "scenes": int(row["scenes"]),
-            "asked": int(row["asked"]),
-            "regions": {region: _number(row[f"{metric} {region}"]) for region in regions},
-            "avg": _number(row["avg all"]),
-            "seconds": _number(row["seconds"]),
-            "seconds_ranked": bool(row["alike"]),
-            "answered": {region: _number(answered[region][str(method)]) for region in regions},
-            "answers": _number(row["answers"]),
-            "remark": str(row["remark"]),
-        }
-        for method, row in tables.summary(results, cells, metric, _better(metric)).iterrows()
-    ]
-    bad = tables.labelled(cells)
-    bad = bad[bad["status"] != "ok"]
-    columns = ["method", "scene", "seed", "status", "reason"]
-    return {
-        "folder": str(ready.folder),
-        "files": {what: str(path) for what, path in written.items()},
-        "interrupted": stopped,
-        "cells": {str(status): int(count) for status, count in cells["status"].value_counts().items()},
-        "unscored": [dict(zip(columns, map(_plain, row), strict=True)) for row in bad[columns].to_numpy().tolist()],
-        "left_out": {reason: list(scenes) for reason, scenes in ready.left_out.items()},
-        "metric": {"name": metric, "unit": tables.metrics(results).get(metric, ""), "better": _better(metric)},
-        "counted": counted,
-        "clock": costs.CLOCK,
-        "table": rows,
-    }
-
-
-def _number(value: Any) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _plain(value: Any) -> Any:
-    return "" if isinstance(value, float) and math.isnan(value) else value
-
-
-def _better(metric: str) -> Better:
-    return scores.metric_named(metric).better
-
-
 def _say_failed(cells: Any) -> None:
-    bad = tables.labelled(cells)
+    bad = tables.labelled(cells).fillna({"reason": ""})
     for _, row in bad[~bad["status"].isin(FINAL)].iterrows():
-        print(f"matbench: {row['status']}: {row['method']} on {row['scene']}: {_plain(row['reason'])}", file=sys.stderr)
+        complain(f"{row['status']}: {row['method']} on {row['scene']}: {row['reason']}")
 
 
 def say_missing(missing: Sequence[str], options: Options) -> None:
@@ -273,7 +244,7 @@ def say_missing(missing: Sequence[str], options: Options) -> None:
         )
 
 
-def _run(ready: Comparison, todo: Todo, voice: Voice) -> bool:
+def run(ready: Comparison, todo: Todo, voice: Voice) -> bool:
     """Run a comparison and show progress; True if it was interrupted."""
     total, left = len(ready.plan.cells), len(todo.cells)
     if left < total:
@@ -288,34 +259,53 @@ def _run(ready: Comparison, todo: Todo, voice: Voice) -> bool:
 
 
 @contextmanager
-def _ended_as_by_ctrl_c() -> Iterator[None]:
-    """Treat SIGTERM as Ctrl-C in this block.
+def told_to_end() -> Iterator[Callable[[], None]]:
+    """Treat SIGTERM and SIGHUP as Ctrl-C in this block, once; yields a function from whose call on they are ignored.
 
-    Batch systems end jobs with it. The running cells are then ended, and the tables are written, all the same.
+    Batch systems end jobs with the first, and a terminal that is closed sends the second. The running cells are then
+    ended, and the tables are written, all the same. Whoever ignores SIGHUP, as nohup does, is heeded.
     """
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    numbers = [signal.SIGTERM, *([signal.SIGHUP] if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL else [])]
+
+    def ignore() -> None:
+        for number in numbers:
+            signal.signal(number, signal.SIG_IGN)
+
+    def end(number: int, frame: FrameType | None) -> None:
+        ignore()  # a shell that is closed sends one more
+        signal.default_int_handler(number, frame)
+
+    before = {number: signal.signal(number, end) for number in numbers}
     try:
-        yield
+        yield ignore
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
-def _measured(results: Any, metric: str, voice: Voice) -> str:
-    """The metric to print: the one asked for; if it was not measured, as on scenes without truth, one that was."""
+def _measured(results: Any, ready: Comparison, voice: Voice) -> tuple[str, ...]:
+    """The metrics to print: those asked for; if none was measured, as on scenes without truth, one that was."""
     measured = list(dict.fromkeys(results["metric"]))
-    if not measured or metric in measured:
-        return metric
-    shown = "prediction_psnr" if "prediction_psnr" in measured else str(measured[0])
-    if metric != tables.METRIC:  # scenes without truth have predictions only
+    found = tuple(name for name in ready.metrics if name in measured)
+    lacking = ", ".join(name for name in ready.metrics if name not in measured)
+    if not measured or not lacking:
+        return ready.metrics
+    shown = found or tuple(name for name in (tables.METRIC, "prediction_psnr", *measured) if name in measured)[:1]
+    if ready.settings.metrics:  # else scenes without truth have predictions only, and nobody asked for more
+        were = "was" if len(ready.metrics) == len(found) + 1 else "were"
         voice.say(
-            f"{metric} was not measured, shown is {shown}: predictions need [predict=left] or [predict=right] "
-            "after the scene, and metrics of volumes a method that has one"
+            f"{lacking} {were} not measured, shown is {', '.join(shown)}: predictions need [predict=left] or "
+            "[predict=right] after the scene, all others true disparities; those of volumes and of confidence also "
+            "need a method that gives one"
         )
     return shown
 
 
-def _print_tables(results: Any, cells: Any, switches: Any, sweeps: Any, metric: str, console: Console) -> None:
-    for table in terminal.tables(results, cells, metric, _better(metric), console.width):
+def _print_tables(
+    results: Any, cells: Any, switches: Any, sweeps: Any, metrics: Sequence[str], console: Console
+) -> None:
+    metric, others = metrics[0], {name: better(name) for name in metrics[1:]}
+    for table in terminal.tables(results, cells, metric, better(metric), console.width, others):
         console.print(table)
     for table in curves.terminal(sweeps, metric):
         console.print(table)

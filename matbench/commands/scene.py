@@ -81,15 +81,15 @@ def _show(names: Sequence[str], out: Path | None, record: bool, data: Path | Non
         path = out or Path(f"scene-{_file_name(name)}.png")
         if not path.parent.is_dir():
             raise UserError(f"folder {str(path.parent)!r} of --out does not exist")
-        with console.status(f"{name}: reading"):
+        with console.busy(f"{name}: reading"):
             scene = load_scene(name, data)
-        with console.status(f"{name}: drawing"):
+        with console.busy(f"{name}: drawing"):
             write_bytes(path, contact_sheet(scene))
         console.say(f"contact sheet: {path}")
         if record:
             from matbench.recording.rrd import record_scene
 
-            with console.status(f"{name}: recording"):
+            with console.busy(f"{name}: recording"):
                 record_scene(path.with_suffix(".rrd"), scene)
             console.say(f"recording: matbench view {shlex.quote(str(path.with_suffix('.rrd')))}")
     return DONE
@@ -153,17 +153,23 @@ def _check(name: str, data: Path | None) -> int:
 
     spec = parse(name)[0]
     folder = own_folder(spec.name) or (spec.name if "/" not in spec.name else None)
-    with console.status("reading") as status:
+    with console.busy("reading") as status:
         if folder is not None:
-            stored = describe(folder)
+            stored = describe(folder, spec.options)
             for problem in stored.problems():
                 tell(Observation("files", "problem", problem))
             if told:
                 return FAILED
-            files = dict(zip(stored.labels, (path.name for path in stored.views), strict=True))
+            names = [path.name for path in stored.views]
+            if len(set(names)) < len(names):  # one in each folder
+                names = [os.path.relpath(path, folder) for path in stored.views]
+            files = dict(zip(stored.labels, names, strict=True))
         scene = load_scene(name, data)
         size = f"{scene.n} views of {scene.width}x{scene.height} px"
         tell(Observation("files", "good", f"{size}, reference view {scene.labels[scene.ref]}"))
+        if folder is not None and stored.column:
+            turned = "they were taken one below the other, so all are turned by a quarter, counter-clockwise"
+            tell(Observation("turned", "note", f"{turned}: maps of them must be, too"))
         status.update("matching features, warping views")
         for finding in check(scene, [files[label] for label in scene.labels] if files else None):
             tell(finding)
@@ -185,8 +191,9 @@ def new(
     """Write the scene.toml of a folder of images: the views in order, the range, and what else may stand there.
 
     Images are sorted as people do (im2 before im10), then by where features show that they were
-    taken. Files called disp..., truth..., mask... are no views. The range is measured, with a wide
-    margin, unless you give it.
+    taken. Files called disp..., truth..., mask... are no views, and neither is what looks like a map. The
+    range is measured, with a wide margin, unless you give it; so are uneven steps, and views that were taken
+    one below the other.
 
     **Examples**
 
@@ -197,20 +204,18 @@ def new(
     Parameters
     ----------
     folder
-        With the images: PNG, or binary PPM or PGM, all of one size.
+        With the images: PNG, JPEG, TIFF, or binary PPM or PGM, all of one size.
     """
     from matbench.datasets import scaffold
+    from matbench.spec import quoted
 
     console = Console()
-    with console.status("matching features"):
+    with console.busy("matching features"):
         draft = scaffold.write_scene_toml(folder, disparities, force)
     for remark in draft.remarks:
         console.say(f"• {remark}")
     console.say(f"written: {draft.path}")
-    if set("[],") & set(str(folder)):
-        console.say("next: rename the folder: brackets and commas in it cannot be told from a scene's options")
-        return DONE
     # only what has a slash may hold blanks
     path = f"./{folder}" if " " in str(folder) and "/" not in str(folder) else str(folder)
-    console.say(f"next: {shlex.join(['matbench', 'scene', 'check', path])}")
+    console.say(f"next: {shlex.join(['matbench', 'scene', 'check', quoted(path)])}")
     return DONE

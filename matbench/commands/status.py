@@ -1,14 +1,13 @@
 """`matbench status`: where a run stands."""
 
-import json
-import shlex
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from matbench.commands.console import DONE, Console
+from matbench.commands.console import DONE, Console, print_json
 from matbench.commands.progress import duration
+from matbench.results.freshness import renewal
 from matbench.results.status import Standing, prune, standing
 
 app = App(
@@ -50,7 +49,7 @@ def status(
     removed = prune(run) if remove else 0
     found = standing(run)
     if as_json:
-        print(json.dumps(_json(found), indent=1))
+        print_json(_json(found))
         return DONE
     console = Console()
     if removed:
@@ -77,7 +76,7 @@ def _lines(found: Standing) -> list[str]:
         size = found.stale_bytes / 2**20
         lines.append(f"{found.stale} stored cells ({size:.1f} MiB) are of other code or pixels; --prune removes them")
     if found.tables and not found.work:
-        lines.append(f"tables are stale, {found.tables}: type matbench score {shlex.quote(str(found.folder))}")
+        lines.append(f"tables are stale, {found.tables}: type {renewal(found.folder)}")
     return lines
 
 

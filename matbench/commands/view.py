@@ -39,8 +39,6 @@ def view(
     cell
         Part of the cell's name or key; not needed where there is only one recording.
     """
-    from tempfile import TemporaryDirectory
-
     from matbench.recording import viewer
     from matbench.runs.store import Store
 
@@ -49,11 +47,12 @@ def view(
         return DONE
     if run.suffix == ".rrd" or cell is not None:
         raise UserError("--compare takes two cells of a run: matbench view RUN --compare A B")
+    from matbench.files.temporary import temporary_folder
     from matbench.recording import side_by_side
 
     one, other = (Store(run).recording(part) for part in compare)
-    with TemporaryDirectory(prefix="matbench-") as folder:
-        path = Path(folder) / "compare.rrd"
+    with temporary_folder() as folder:
+        path = folder / "compare.rrd"
         side_by_side.merge(path, one, other)
         viewer.view(path, web)
     return DONE

@@ -4,7 +4,6 @@ Decoders fill missing rows with grey and report nothing, so each file is checked
 """
 
 import re
-import stat
 import zlib
 from hashlib import sha256
 from pathlib import Path
@@ -13,7 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from matbench.errors import UserError
+from matbench.errors import UserError, cause
+from matbench.files import jpeg, tiff
+from matbench.files.jpeg import is_jpeg
+from matbench.files.plain import NotPlain, open_plain, read_plain
+from matbench.files.tiff import is_tiff
 
 LARGEST = 64_000_000
 """Most pixels of an image. What claims more is damaged, or meant to exhaust memory."""
@@ -21,14 +24,19 @@ LARGEST = 64_000_000
 LARGEST_FILE = 1 << 30
 """Most bytes of a file that is read into memory."""
 
+ENDINGS = (".png", ".ppm", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff")
+"""What files of views are called, in the order in which they are looked for."""
+
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_GREY = 0
 _PNG_CHANNELS = {_PNG_GREY: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # colour type -> samples of a pixel
+_NUMBERS = {b"\x93NUMPY": "npy", b"PK\x03\x04": "npz"}
+_MOST_HEADER = 1 << 12  # bytes: a pattern that repeats keeps hundreds of bytes for each blank that it has passed
 _PNM = re.compile(rb"P([56])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})\s")
 
 
 def read_rgb(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """Read a PNG, PPM or PGM file of 8 bits a channel.
+    """Read a PNG, PPM, PGM, JPEG or TIFF file. Of 16 bits a channel, the upper 8 are taken, rounded.
 
     Parameters
     ----------
@@ -46,8 +54,10 @@ def read_rgb(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint
     UserError
         If it is missing, of another kind, truncated, damaged or of another size.
     """
-    image: NDArray[np.uint8] = _read_image(path, size, 8)
-    return image
+    image = _read_image(path, size)
+    if image.dtype == np.uint8:
+        return image
+    return ((image.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
 
 
 def read_levels(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint16]:
@@ -63,36 +73,48 @@ def read_levels(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.u
         As `read_rgb`, if the image is coloured, and if there are fewer than 8 bits a pixel: the decoder would
         stretch them to 256 levels, so that the stored levels are lost.
     """
-    image = _read_image(path, size, 16)
+    image = _read_image(path, size, levels=True)
     if (image != image[..., :1]).any():
         raise UserError(f"image {path} is coloured: ground truth is one grey level a pixel")
     return image[..., 0].astype(np.uint16)
 
 
 def encoding(path: Path) -> str:
-    """How a file of ground truth stores its numbers, by its header: ``grey8``, ``grey16`` or ``pfm``.
+    """How a file of ground truth stores its numbers, by its header.
+
+    It is ``grey8``, ``grey16``, ``pfm``, ``npy``, ``npz`` or ``tiff``.
 
     Raises
     ------
     UserError
         If it is missing, or of no such kind.
     """
-    data = read_bytes(path, "ground truth", first=4096)
+    data = read_bytes(path, "ground truth", first=_MOST_HEADER)
     if data[:2] in (b"Pf", b"PF"):
         return "pfm"
+    if known := next((kind for head, kind in _NUMBERS.items() if data.startswith(head)), None):
+        return known
+    if is_jpeg(data):
+        raise UserError(f"{path} is a JPEG, which keeps no exact numbers: ground truth is PFM, PNG, PGM, TIFF or NPY")
+    if is_tiff(data):
+        return "tiff"
     _size(path, data)
     found = _PNM.match(data)
     is_deep = int(found[4]) > 255 if found else data[24] > 8
     return "grey16" if is_deep else "grey8"
 
 
-def _read_image(path: Path, size: tuple[int, int] | None, bits: int) -> NDArray[Any]:
-    """(H, W, 3) uint8 or uint16, RGB, of at most so many bits a channel."""
+def _read_image(path: Path, size: tuple[int, int] | None, levels: bool = False) -> NDArray[Any]:
+    """(H, W, 3) uint8 or uint16, RGB; `levels` are wanted exactly as they are stored."""
     data = read_bytes(path)
     width, height = _size(path, data)
     if size is not None and (width, height) != size:
         raise UserError(f"image {path} is {width}x{height} px, not {size[0]}x{size[1]} as the others of its scene")
-    return _decode_png(path, data, bits) if data.startswith(_PNG) else _decode_pnm(path, data, bits)
+    if is_jpeg(data):
+        return _decode_jpeg(path, data)
+    if is_tiff(data):
+        return _decode_tiff(path, data)
+    return _decode_png(path, data, levels) if data.startswith(_PNG) else _decode_pnm(path, data)
 
 
 def read_size(path: Path) -> tuple[int, int]:
@@ -103,7 +125,9 @@ def read_size(path: Path) -> tuple[int, int]:
     UserError
         If the file is missing or has no such header.
     """
-    return _size(path, read_bytes(path, first=4096))
+    data = read_bytes(path, first=_MOST_HEADER)
+    # in a TIFF the size may stand anywhere, and in a JPEG behind a preview
+    return _size(path, read_bytes(path) if is_tiff(data) or is_jpeg(data) else data)
 
 
 def pixel_digests(path: Path) -> set[str]:
@@ -142,19 +166,18 @@ def read_bytes(path: Path, what: str = "image", limit: int = LARGEST_FILE, first
         If it is missing, larger than `limit`, or no file: a pipe would never end.
     """
     try:
-        found = path.stat()
-        if not stat.S_ISREG(found.st_mode):
-            raise UserError(f"{what} {path} cannot be read: it is no file")
-        if found.st_size > limit:
-            raise UserError(f"{what} {path} has {found.st_size} bytes: {limit} are possible")
-        with path.open("rb") as file:
+        if first < 0:
+            return read_plain(path, most=limit)
+        with open_plain(path, most=limit) as file:
             return file.read(first)
     except FileNotFoundError:
         raise UserError(f"{what} {path} is missing") from None
+    except NotPlain as error:
+        raise UserError(f"{what} {path} cannot be read: {error}") from None
     except ValueError:  # a null character
         raise UserError(f"{what} {str(path)!r} is missing: no file can have that name") from None
     except OSError as error:
-        raise UserError(f"{what} {path} cannot be read: {error.strerror}") from None
+        raise UserError(f"{what} {path} cannot be read: {cause(error)}") from None
 
 
 def _size(path: Path, data: bytes) -> tuple[int, int]:
@@ -162,26 +185,31 @@ def _size(path: Path, data: bytes) -> tuple[int, int]:
         if data[12:16] != b"IHDR" or len(data) < 33:
             raise UserError(f"image {path} is truncated or damaged: no PNG header in its {len(data)} bytes")
         width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))
+    elif is_jpeg(data):
+        try:
+            width, height = jpeg.size(data)
+        except jpeg.NotJpeg as error:
+            raise UserError(f"image {path} {error}") from None
+    elif is_tiff(data):
+        height, width = tiff.size(data) or (0, 0)
     else:
-        found = _PNM.match(data)
+        found = _PNM.match(data[:_MOST_HEADER])
         if not found:
             what = f"starts with {data[:8]!r}" if data else "is empty"
-            raise UserError(f"image {path} {what}: PNG and binary PPM or PGM (P6, P5) can be read")
+            raise UserError(f"image {path} {what}: PNG, JPEG, TIFF and binary PPM or PGM (P6, P5) can be read")
         width, height = int(found[2]), int(found[3])
     if not (width > 0 and height > 0 and width * height <= LARGEST):
         raise UserError(f"image {path} claims {width}x{height} px: 1 to {LARGEST} px in all are possible")
     return width, height
 
 
-def _decode_pnm(path: Path, data: bytes, bits: int) -> NDArray[Any]:
-    found = _PNM.match(data)
+def _decode_pnm(path: Path, data: bytes) -> NDArray[Any]:
+    found = _PNM.match(data[:_MOST_HEADER])
     assert found is not None, "`_size` has matched it"  # noqa: S101
     width, height, channels = int(found[2]), int(found[3]), 3 if found[1] == b"6" else 1
     levels = int(found[4])
-    possible = {255} if bits == 8 else {255, 65535}
-    if levels not in possible:
-        these = " or ".join(f"{most} ({8 if most == 255 else 16} bits)" for most in sorted(possible))
-        raise UserError(f"image {path} has grey levels up to {levels}: {these} is possible")
+    if levels not in (255, 65535):
+        raise UserError(f"image {path} has grey levels up to {levels}: 255 (8 bits) or 65535 (16 bits) is possible")
     kind = np.dtype(">u2" if levels > 255 else "u1")
     wanted, present = width * height * channels * kind.itemsize, len(data) - found.end()
     if present != wanted:
@@ -191,25 +219,50 @@ def _decode_pnm(path: Path, data: bytes, bits: int) -> NDArray[Any]:
     return np.ascontiguousarray(np.broadcast_to(pixels, (height, width, 3)), kind.newbyteorder("="))
 
 
-def _decode_png(path: Path, data: bytes, bits: int) -> NDArray[Any]:
+def _decode_png(path: Path, data: bytes, levels: bool) -> NDArray[Any]:
+    _check_png(path, data, levels)
+    if (image := _decoded(data, deep=data[24] > 8)) is None:
+        raise UserError(f"image {path} is damaged: its PNG data cannot be decoded")
+    return image
+
+
+def _decode_jpeg(path: Path, data: bytes) -> NDArray[Any]:
+    try:
+        jpeg.check_whole(data)
+    except jpeg.NotJpeg as error:
+        raise UserError(f"image {path} {error}") from None
+    if (image := _decoded(data)) is None or image.shape[1::-1] != jpeg.size(data):
+        raise UserError(f"image {path} is damaged: its JPEG data cannot be decoded")
+    return image
+
+
+def _decode_tiff(path: Path, data: bytes) -> NDArray[Any]:
+    found = tiff.decode(data)
+    if found is None or found.shape[:2] != tiff.size(data):
+        raise UserError(f"image {path} is a damaged TIFF, or one of a kind that cannot be read")
+    if found.dtype not in (np.uint8, np.uint16) or (found.ndim == 3 and found.shape[2] not in (1, 3, 4)):
+        raise UserError(f"image {path} holds {found.shape} {found.dtype}: 8 or 16 bits of grey or colour are needed")
+    colours = found[..., None] if found.ndim == 2 else found[..., :3]
+    return np.ascontiguousarray(np.broadcast_to(colours[..., ::-1], (*found.shape[:2], 3)))
+
+
+def _decoded(data: bytes, deep: bool = False) -> NDArray[Any] | None:
+    """(H, W, 3) RGB as OpenCV decodes it; None if it cannot."""
     import cv2
 
-    _check_png(path, data, bits)
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(0)  # what is wrong is told by our own error
-    depth = cv2.IMREAD_ANYDEPTH if bits > 8 else 0
+    depth = cv2.IMREAD_ANYDEPTH if deep else 0
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION | depth)
     except cv2.error:
         image = None
     finally:
         cv2.utils.logging.setLogLevel(level)
-    if image is None:
-        raise UserError(f"image {path} is damaged: its PNG data cannot be decoded")
-    return np.ascontiguousarray(image[..., ::-1])
+    return None if image is None else np.ascontiguousarray(image[..., ::-1])
 
 
-def _check_png(path: Path, data: bytes, most: int) -> None:
+def _check_png(path: Path, data: bytes, levels: bool) -> None:
     """Walk the chunks to the end, with their checksums, and unpack the pixels.
 
     Raises
@@ -219,9 +272,9 @@ def _check_png(path: Path, data: bytes, most: int) -> None:
     """
     width, height = _size(path, data)
     bits, colour, interlaced = data[24], data[25], data[28]
-    if bits > most or colour not in _PNG_CHANNELS:
-        raise UserError(f"image {path} has {bits} bits a channel (PNG colour type {colour}): up to {most} are possible")
-    if most > 8 and bits < 8 and colour == _PNG_GREY:
+    if bits > 16 or colour not in _PNG_CHANNELS:
+        raise UserError(f"image {path} has {bits} bits a channel (PNG colour type {colour}): up to 16 are possible")
+    if levels and bits < 8 and colour == _PNG_GREY:
         raise UserError(f"image {path} has {bits} bits a channel: ground truth has 8 or 16")
     at, packed = len(_PNG), []
     while True:

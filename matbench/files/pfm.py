@@ -19,6 +19,7 @@ from matbench.files.images import LARGEST, read_bytes
 
 _HEADER = re.compile(rb"P([Ff])\s{1,99}(\d{1,9})\s{1,99}(\d{1,9})\s{1,99}([-+]?[0-9.eE+-]{1,40})(?:\r\n|\s)")
 
+_MOST_HEADER = 1 << 10  # bytes; the pattern ends before
 _TINIEST, _HUGEST = 1e-30, 1e6
 """Px. No disparity is closer to 0 without being it, or larger; numbers read in the wrong byte order are."""
 
@@ -47,7 +48,7 @@ def read_disparities(
         If it is missing, of another kind, truncated, damaged, of another size or byte order.
     """
     data, name = read_bytes(path, what), f"{what} {path}"
-    found = _HEADER.match(data)
+    found = _HEADER.match(data[:_MOST_HEADER])
     if not found:
         raise UserError(f"{name} starts with {data[:8]!r}: a PFM header is 'Pf', width, height and scale")
     if found[1] == b"F":

@@ -15,10 +15,13 @@ from typing import TYPE_CHECKING
 from attrs import frozen
 
 from matbench._version import __version__
+from matbench.files.writing import move
 
 if TYPE_CHECKING:
     from requests import Response, Session
     from urllib3 import Retry
+
+    from matbench.files.pace import Pace
 
 CHUNK = 1 << 14
 LONGEST_PAUSE = 30.0  # s
@@ -104,7 +107,7 @@ def download(
     except TransferError:
         part.unlink(missing_ok=True)
         raise
-    part.replace(target)
+    move(part, target)
     return resumed
 
 
@@ -113,7 +116,11 @@ def _session() -> "Session":
     """Connections that stay open for further files from the same server."""
     import requests
 
+    from matbench.files.pace import PacedAdapter
+
     session = requests.Session()
+    for kind in ("http://", "https://"):
+        session.mount(kind, PacedAdapter())
     session.headers.update({"User-Agent": f"matbench/{__version__}", "Accept-Encoding": "identity"})
     return session
 
@@ -135,7 +142,8 @@ def _persist(
         try:
             _attempt(url, part, limit, patience, listen)
             return
-        except (exceptions.InvalidURL, exceptions.InvalidSchema, exceptions.TooManyRedirects) as error:
+        except (exceptions.InvalidSchema, exceptions.TooManyRedirects, ValueError) as error:
+            # of a server that sends elsewhere, the address may be anything: no `InvalidURL` for some
             raise TransferError(f"it cannot be fetched: {error}") from error
         except (exceptions.RequestException, HTTPError) as error:
             if _size(part) >= most + LEAST:  # it came further than ever: the server is alive
@@ -179,10 +187,32 @@ def _attempt(
 ) -> None:
     """One request: the part is whole afterwards."""
     from requests.exceptions import RequestException
+    from urllib3.exceptions import HTTPError
+
+    from matbench.files.pace import Pace
+
+    pace = Pace(patience.timeout, LEAST)
+    try:
+        with pace:
+            _request(url, part, limit, pace, listen)
+    except (RequestException, HTTPError) as error:
+        if pace.stalled:
+            raise RequestException("the connection stalled") from error
+        raise
+
+
+def _request(
+    url: str,
+    part: Path,
+    limit: int,
+    pace: "Pace",
+    listen: Callable[[int, int | None], None],
+) -> None:
+    from requests.exceptions import RequestException
 
     offset = _size(part)
     headers = {"Range": f"bytes={offset}-"} if offset else {}
-    with _session().get(url, headers=headers, stream=True, timeout=patience.timeout) as response:
+    with _session().get(url, headers=headers, stream=True, timeout=pace.seconds) as response:
         if response.status_code == 416 and offset:
             if response.headers.get("Content-Range") == f"bytes */{offset}":
                 return
@@ -202,9 +232,9 @@ def _attempt(
         total = offset + int(length) if length.isdecimal() and is_plain else None
         if total is not None and total > limit:
             raise TransferError(f"{total} bytes are offered, at most {limit} can be right")
+        first = offset
         with part.open("ab" if offset else "wb") as file:
             listen(offset, total)
-            since, then = time.monotonic(), offset
             # not `iter_content`: it waits for a whole chunk, however slowly that comes
             while chunk := response.raw.read1(CHUNK, decode_content=True):
                 offset += len(chunk)
@@ -212,10 +242,9 @@ def _attempt(
                     raise TransferError(f"more than {limit} bytes came")
                 file.write(chunk)
                 listen(offset, total)
-                if offset - then >= LEAST:
-                    since, then = time.monotonic(), offset
-                elif time.monotonic() - since > patience.timeout:
-                    raise RequestException("the connection stalled")
+                pace.came(offset - first)
+            if pace.stalled:  # without a length, the end of a connection is the end of the file
+                raise RequestException("the connection stalled")
 
 
 def _status(response: "Response") -> str:

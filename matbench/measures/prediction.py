@@ -76,7 +76,7 @@ def hold_out(scene: Scene, end: str) -> Scene:
         called = f"the {end} view, {scene.labels[index]}, is the reference view"
         raise NotInScene(f"{scene.name}: {called}: predict={possible[0]} is possible")
     rest = [view for view in range(scene.n) if view != index]
-    held_out = HeldOut(scene.labels[index], index - scene.ref, scene.views[index])
+    held_out = HeldOut(scene.labels[index], scene.steps(index), scene.views[index])
     return evolve(scene.choose(rest), held_out=held_out)
 
 

@@ -1,18 +1,19 @@
 """Volumes as a run stores them: rounded to 256 levels, and read along the rays of a view."""
 
-import zipfile
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from attrs import astuple, field, frozen
+from attrs import astuple, field, fields, frozen
 from numpy.typing import NDArray
 
+from matbench.files.arrays import opened_arrays
 from matbench.scene import Scene
 from matbench.space import DisparitySpace, Volume
 
 _LEVELS = 255
+_MOST_VIEWS, _FINEST = 1000, 16
 
 
 @frozen(eq=False)
@@ -64,20 +65,33 @@ class StoredVolume:
         np.savez_compressed(path, levels=self.levels, space=space, views=np.array(self.views, np.int64))
 
     @classmethod
-    def read(cls, path: Path) -> "StoredVolume":
-        """Read what `write` wrote.
+    def read(cls, path: Path, scene: Scene | None = None) -> "StoredVolume":
+        """Read what `write` wrote. It is not unpacked unless it can be right.
+
+        Parameters
+        ----------
+        scene
+            What it must be a volume of, if that is known (`check_space`).
 
         Raises
         ------
         ValueError, OSError
             If it is missing, damaged, or holds something else.
         """
-        try:
-            with np.load(path, allow_pickle=False) as arrays:
-                space, views = (arrays[name].astype(np.int64).tolist() for name in ("space", "views"))
-                return cls(DisparitySpace(*space), arrays["levels"], tuple(views))
-        except (KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-            raise ValueError(f"{path} holds no volume") from error
+        with opened_arrays(path) as arrays:
+            claims = arrays.claims
+            known = {name: claims[name].shape if name in claims else () for name in ("space", "views")}
+            if known["space"] != (len(fields(DisparitySpace)),) or not 0 < np.prod(known["views"]) <= _MOST_VIEWS:
+                raise ValueError(f"{path} holds no volume")
+            numbers, views = (arrays.read(name).astype(np.int64).ravel().tolist() for name in known)
+            space = DisparitySpace(*numbers)
+            if min(space.views - 1, space.rows, space.width, space.planes, space.fineness) < 1:
+                raise ValueError(f"{path} holds no volume: {space} has no points")
+            if scene is not None:
+                check_space(space, tuple(views), scene)
+            if "levels" not in claims or claims["levels"].shape != space.shape or claims["levels"].dtype != np.uint8:
+                raise ValueError(f"{path} holds no levels of {space}")
+            return cls(space, arrays.read("levels"), tuple(views))
 
     def rays(self, view: int) -> NDArray[np.uint8]:
         """(rows, planes, width) levels along the rays of one view of the scene, far to near.
@@ -97,6 +111,19 @@ class StoredVolume:
 
 
 _ROUNDING = 1e-4
+
+
+def check_space(space: DisparitySpace, views: tuple[int, ...], scene: Scene) -> None:
+    """Raise ValueError if a volume's space is none of a scene, or much larger than what is searched there.
+
+    A space with many planes is large before any of its points is known, and packs to next to nothing.
+    """
+    step = views[1] - views[0] if len(views) > 1 else 1
+    searched = (scene.disparities.largest - scene.disparities.least) * step * space.fineness
+    if (space.rows, space.width) != (scene.height, scene.width) or not (min(views) >= 0 and max(views) < scene.n):
+        raise ValueError(f"the volume spans the views {views} of {space}, which is another scene")
+    if space.fineness > _FINEST or space.planes > 2 * searched + 8 * space.fineness:
+        raise ValueError(f"{space} has {space.planes} planes of 1/{space.fineness} px: more than the scene has use for")
 
 
 @frozen(eq=False)

@@ -70,8 +70,8 @@ def picture_columns(image: NDArray[np.uint8]) -> tuple[int, int]:
     return (int(lit[0]), int(lit[-1])) if len(lit) else (0, image.shape[1] - 1)
 
 
-def warped(image: NDArray[np.uint8], disparity: NDArray[np.float32], steps: int) -> NDArray[np.float32]:
-    """The reference view, reconstructed from the colours of the view that is `steps` to its right.
+def warped(image: NDArray[np.uint8], disparity: NDArray[np.float32], steps: float) -> NDArray[np.float32]:
+    """The reference view, reconstructed from the colours of the view that is `steps` view steps to its right.
 
     Parameters
     ----------

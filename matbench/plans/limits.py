@@ -5,6 +5,7 @@ import re
 from contextlib import suppress
 from math import isfinite
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from matbench.errors import UserError
 
@@ -23,11 +24,31 @@ def seconds(value: object) -> float | None:
     """
     if value is None or value == "none":
         return None
-    with suppress(TypeError, ValueError):
+    with suppress(TypeError, ValueError, OverflowError):
         number = float(value)  # type: ignore[arg-type]
         if isfinite(number) and number > 0 and not isinstance(value, bool):
             return number
     raise UserError(f"timeout {value!r} is not a positive number of seconds, such as 600, or none")
+
+
+def duration(name: str, text: str) -> float | None:
+    """Seconds from a text such as ``90``, ``90s``, ``10m`` or ``2h``; None for ``none``: no limit.
+
+    >>> duration("budget", "1.5h")
+    5400.0
+
+    Raises
+    ------
+    UserError
+        If it is anything else, or nothing.
+    """
+    if text == "none":
+        return None
+    found = re.fullmatch(r"([0-9]{1,6}(?:\.[0-9]{1,3})?)([smh]?)", text)
+    seconds = float(found.group(1)) * {"": 1, "s": 1, "m": 60, "h": 3600}[found.group(2)] if found else 0
+    if not seconds:
+        raise UserError(f"{name} {text!r} is no time such as 90s, 10m or 2h")
+    return seconds
 
 
 def mebibytes(value: object) -> int | None:
@@ -90,6 +111,26 @@ def isolation(value: object) -> str:
     if value not in ("process", "shared"):
         raise UserError(f"isolation {value!r} is not process or shared")
     return str(value)
+
+
+def scheduler(value: object) -> str | None:
+    """The address of a Dask scheduler, or ``local``.
+
+    Raises
+    ------
+    UserError
+        If it is neither.
+    """
+    if value is None:
+        return None
+    address = str(value)
+    if address == "local":
+        return address
+    with suppress(ValueError):  # a port that is no number, brackets without an end
+        parts = urlsplit(address if "://" in address else f"tcp://{address}")
+        if parts.hostname and parts.port:
+            return address
+    raise UserError(f"Dask scheduler {address!r} is no address: write tcp://HOST:PORT of one that runs, or local")
 
 
 def cores() -> int:

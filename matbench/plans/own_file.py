@@ -4,14 +4,19 @@ In a plug-in, ``import helper`` means the file beside it, as in a script. No oth
 and its helpers become modules of an artificial package, and only the imports of these modules look there first. So
 two folders may each have a ``helper.py``. The package's name contains a digest of the code: changed code is another
 package, and is imported again.
+
+A method may start processes, as by `multiprocessing`. These find its classes and functions under the same names: the
+package lies below this module, which every process can import, and a variable of the environment says where its files
+are.
 """
 
 import builtins
 import importlib
 import importlib.util
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from hashlib import sha256
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
@@ -19,10 +24,14 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from matbench import code
-from matbench.errors import UserError, failure
+from matbench.errors import UserError, cause, failure
 from matbench.plans import kernels
 
-_PREFIX = "matbench_plugin_"
+__path__: list[str] = []  # this module is a package, too: that of the packages of all plug-ins
+_PREFIX = f"{__name__}.p"
+_DIGITS = 16
+_VARIABLE = "MATBENCH_PLUGIN_"  # and the digits of a package: the path of its plug-in
+_files: dict[str, Path] = {}  # the packages that this process has looked at -> their plug-ins
 
 
 def import_file(path: Path) -> ModuleType:
@@ -36,47 +45,52 @@ def import_file(path: Path) -> ModuleType:
     if path.suffix != ".py":
         raise UserError(f"plug-in file {str(path)!r} is not a Python file: its name must end in .py")
     path = path.absolute()
+    if path.exists() and not path.is_file():  # a pipe would be waited for
+        raise UserError(f"plug-in file {str(path)!r} is no file")
     try:
-        behind = code.of_file(path)
+        package = _package(path)
     except OSError as error:
-        raise UserError(f"plug-in file {str(path)!r} cannot be read: {error.strerror}") from error
-    package = _PREFIX + sha256(f"{path}\0{behind.digest}".encode()).hexdigest()[:16]
-    name = f"{package}.{path.stem.replace('.', '_')}"
+        raise UserError(f"plug-in file {str(path)!r} cannot be read: {cause(error)}") from error
+    # set each time: a process that solves several cells takes back what the method of one has changed
+    os.environ[_VARIABLE + package.removeprefix(_PREFIX)] = str(path)
+    name = f"{package}.{_stem(path)}"
     if name in sys.modules:
         return sys.modules[name]
-    if _Finder not in sys.meta_path:
-        sys.meta_path.insert(0, _Finder)
     importlib.invalidate_caches()
-    if behind.parts.get("numba", code.NOT_THERE) != code.NOT_THERE:
-        importlib.import_module("numba")  # now: `_kernels_apart` can set its cache folder only if it is imported
-    sys.modules[package] = _made_up(package, path.parent)
     try:
-        return _imported(name, path)
+        return importlib.import_module(name)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # sys.exit included
         # the next try must not find helpers that were imported by this one
-        for one in [one for one in sys.modules if one.partition(".")[0] == package]:
+        for one in [one for one in sys.modules if _package_of(one) == package]:
             del sys.modules[one]
         raise UserError(f"plug-in file {str(path)!r}: {failure(error)}") from error
 
 
-def _made_up(name: str, folder: Path) -> ModuleType:
-    package = ModuleType(name)
-    package.__path__ = [str(folder)]
-    package.__spec__ = ModuleSpec(name, None, is_package=True)
+def _package(path: Path) -> str:
+    """The package of a plug-in as its code is now.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
+    behind = code.of_file(path)
+    if behind.parts.get("numba", code.NOT_THERE) != code.NOT_THERE:
+        # now: `_kernels_apart` can set numba's cache folder only if it is imported
+        importlib.import_module("matbench.plans.kernel_cache")
+    package = _PREFIX + sha256(f"{path}\0{behind.digest}".encode()).hexdigest()[:_DIGITS]
+    _files[package] = path
     return package
 
 
-def _imported(name: str, path: Path) -> ModuleType:
-    """The module of a file, which may have a name that no import statement could write."""
-    spec = importlib.util.spec_from_file_location(name, path, loader=_Loader(name, str(path)))
-    assert spec is not None, "it has a loader"  # noqa: S101
-    assert spec.loader is not None, "it is this one"  # noqa: S101
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+def _package_of(module: str) -> str:
+    return module[: len(_PREFIX) + _DIGITS]
+
+
+def _stem(path: Path) -> str:
+    return path.stem.replace(".", "_")
 
 
 class _Loader(SourceFileLoader):
@@ -91,7 +105,7 @@ class _Loader(SourceFileLoader):
     def exec_module(self, module: ModuleType) -> None:
         """Run the module so that its import statements, also those in functions, look beside it first."""
         # Python looks up `__import__` in the builtins of the importing module, at every import statement
-        package = module.__name__.partition(".")[0]
+        package = _package_of(module.__name__)
         own = {**vars(builtins), "__import__": _Import(package, module.__name__)}
         module.__dict__["__builtins__"] = own
         with _kernels_apart(package):
@@ -99,17 +113,43 @@ class _Loader(SourceFileLoader):
 
 
 class _Finder:
-    """Finds the modules of plug-ins, and has `_Loader` run them."""
+    """Finds the packages of plug-ins and the modules in them, and has `_Loader` run them."""
 
     @classmethod
     def find_spec(cls, name: str, path: Sequence[str] | None = None, _: Any = None) -> ModuleSpec | None:
-        """The module where Python would find it; None for modules of no plug-in."""
-        if path is None or not name.startswith(_PREFIX):
+        """The package of a plug-in, or a module in it where Python would find it; None for all others."""
+        if not name.startswith(_PREFIX):
             return None
-        spec = PathFinder.find_spec(name, path)
-        if spec is not None and type(spec.loader) is SourceFileLoader:
-            spec.loader = _Loader(spec.loader.name, spec.loader.path)
-        return spec
+        package = _package_of(name)
+        file = _files.get(package) or cls._named(package)
+        if file is None:
+            return None
+        if name == package:
+            spec = ModuleSpec(name, None, is_package=True)
+            spec.submodule_search_locations = [str(file.parent)]
+            return spec
+        if name == f"{package}.{_stem(file)}":  # a file's name may be one that no import statement could write
+            return importlib.util.spec_from_file_location(name, file, loader=_Loader(name, str(file)))
+        found = PathFinder.find_spec(name, path)
+        if found is not None and type(found.loader) is SourceFileLoader:
+            found.loader = _Loader(found.loader.name, found.loader.path)
+        return found
+
+    @staticmethod
+    def _named(package: str) -> Path | None:
+        """The plug-in that the environment names: another process has imported it, and this one is to work for it.
+
+        Raises
+        ------
+        ImportError
+            If its code has been changed since then.
+        """
+        said = os.environ.get(_VARIABLE + package.removeprefix(_PREFIX))
+        if said is None:
+            return None
+        if _package(Path(said)) != package:
+            raise ImportError(f"{said} is not what it was when the process began that asks for it")
+        return Path(said)
 
 
 class _Import:
@@ -150,9 +190,11 @@ def _kernels_apart(package: str) -> Iterator[None]:
         yield
         return
     before = config.CACHE_DIR
-    with suppress(UserError):  # there is no home folder: numba finds a place, or compiles them anew
-        config.CACHE_DIR = str(Path(before or kernels.home()) / package)
+    config.CACHE_DIR = str(Path(before, package) if before else kernels.place(package))
     try:
         yield
     finally:
         config.CACHE_DIR = before
+
+
+sys.meta_path.insert(0, _Finder)

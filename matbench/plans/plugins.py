@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
 from hashlib import sha256
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -17,11 +18,15 @@ from attrs import frozen
 
 from matbench import code, parameters
 from matbench.code import Code
-from matbench.errors import UserError, failure, unknown
+from matbench.errors import UserError, cause, failure, refuse_hidden, unknown
+from matbench.files.plain import NotPlain, digest_content
 from matbench.plans import kernels
 from matbench.plans.own_file import import_file
+from matbench.scene import Scene
 
 Group = Literal["algorithms", "datasets", "metrics"]
+OWN = "matbench-stereo"
+"""The source of the plug-ins that are built in."""
 
 
 @frozen
@@ -53,6 +58,8 @@ class Plugin:
         if isinstance(self.entry, type):
             return self.entry
         try:
+            if self.source != OWN and "numba" in code_of(self).parts:
+                import_module("matbench.plans.kernel_cache")  # before it defines kernels
             return self.entry.load()
         except KeyboardInterrupt:
             raise
@@ -76,7 +83,7 @@ def installed(group: Group) -> Mapping[str, Plugin]:
     found = {}
     for entry in entry_points(group=f"matbench.{group}"):
         source = entry.dist.name if entry.dist else "unknown"
-        if entry.name not in found or source == "matbench-stereo":  # a built-in name cannot be taken over
+        if entry.name not in found or source == OWN:  # a built-in name cannot be taken over
             found[entry.name] = Plugin(entry.name, source, entry)
     return found
 
@@ -116,7 +123,7 @@ def from_file(path: Path, group: Group = "algorithms") -> Mapping[str, Plugin]:
     if not is_any:
         raise UserError(
             f"plug-in file {str(path)!r} holds no method (a class with solve(self, scene, context)), no dataset "
-            "(a class with listings and load) and no Metric"
+            "(a class with listings and load) and no Metric or Family"
         )
     return found
 
@@ -137,14 +144,20 @@ def own_metrics(path: Path) -> tuple[Any, ...]:
 
 
 def _metrics_in(module: ModuleType) -> tuple[Any, ...]:
-    """Whatever looks like a metric; `matbench.results.scores.metrics` checks that it is one."""
+    """Whatever looks like a metric; `matbench.results.metric_catalogue.metrics` checks that it is one."""
     public = [value for name, value in vars(module).items() if not name.startswith("_")]
     every = [one for value in public for one in (value if isinstance(value, list | tuple) else [value])]
-    kinds = [one for one in every if not isinstance(one, type) and callable(getattr(one, "compute", None))]
-    return tuple({id(one): one for one in kinds if hasattr(one, "better")}.values())
+    return tuple({id(one): one for one in every if not isinstance(one, type) and _seems_metric(one)}.values())
+
+
+def _seems_metric(one: Any) -> bool:
+    """Does it compute what is better or worse, or make metrics for a range of numbers?"""
+    marks = {"compute": "better", "make": "least"}
+    return any(callable(getattr(one, call, None)) and hasattr(one, mark) for call, mark in marks.items())
 
 
 def _module_of(path: Path) -> ModuleType:
+    refuse_hidden("plug-in file", str(path))
     if not os.path.isfile(path):  # noqa: PTH113 (False where a folder may not be entered, too)
         raise UserError(f"plug-in file {str(path)!r} does not exist or may not be read: give the path of a Python file")
     return import_file(path)
@@ -206,13 +219,36 @@ def _with_files(group: Group, files: Iterable[Path]) -> dict[str, Plugin]:
     return found
 
 
+_IN_FILE = re.compile(r"(?P<file>.+\.py):(?P<name>[^:/\\]+)", re.DOTALL)
+
+
+def is_in_file(name: str) -> bool:
+    """Does a name say in which file a method is, as ``FILE.py:Class``?"""
+    return _IN_FILE.fullmatch(name) is not None
+
+
 def algorithm(name: str, files: Iterable[Path] = ()) -> Plugin:
-    """The method of that name; a class may be named as written (`MyMethod`) or in snake case."""
-    known = algorithms(files)
+    """The method of that name; a class may be named as written (`MyMethod`) or in snake case.
+
+    ``FILE.py:Class`` is the one in that file, whatever others are called. So two files may hold methods of one name.
+    """
+    if (found := _IN_FILE.fullmatch(name)) is not None:
+        return in_file(Path(found["file"]).resolve(), found["name"])
+    if re.fullmatch(r".+\.py:?", name):
+        raise UserError(f"unknown algorithm {name!r}: write FILE.py:Class for a method in a file of yours")
+    return _named("algorithm", name, algorithms(files))
+
+
+def in_file(path: Path, name: str) -> Plugin:
+    """The method of that name in a user's own file."""
+    return _named(f"method of {path}", name, from_file(path))
+
+
+def _named(kind: str, name: str, known: Mapping[str, Plugin]) -> Plugin:
     for candidate in (name, snake_case(name)):
         if candidate in known:
             return known[candidate]
-    raise unknown("algorithm", name, known)
+    raise unknown(kind, name, known)
 
 
 def code_of(plugin: Plugin) -> Code:
@@ -228,7 +264,7 @@ def code_of(plugin: Plugin) -> Code:
     try:
         return code.of_file(Path(plugin.source))
     except OSError as error:
-        raise UserError(f"plug-in file {plugin.source!r} cannot be read: {error.strerror}") from error
+        raise UserError(f"plug-in file {plugin.source!r} cannot be read: {cause(error)}") from error
 
 
 def read_ahead(name: str, files: Iterable[str]) -> None:
@@ -281,27 +317,60 @@ def method_digest(plugin: Plugin, instance: object) -> str:
     digest = sha256(code_digest(plugin).encode())
     for said, file in files.items():
         try:
-            digest.update(bytes.fromhex(code.of_content(file)))
+            digest.update(bytes.fromhex(digest_content(file)))
         except OSError as error:
-            raise UserError(f"{plugin.name}: {said!r} cannot be read: {error.strerror}") from error
+            raise UserError(f"{plugin.name}: {said!r} cannot be read: {cause(error)}") from error
+        except NotPlain as error:
+            raise UserError(f"{plugin.name}: {said!r} cannot be read: {error}") from error
     return digest.hexdigest()
+
+
+def reads_files(instance: object) -> bool:
+    """May a method read files of its own for a scene?"""
+    return callable(getattr(instance, "reads_for", None))
+
+
+def scene_files(instance: object, scene: Scene) -> str:
+    """Digest of the files that a method reads for one scene (`Algorithm.reads_for`); empty if there are none.
+
+    Raises
+    ------
+    UserError
+        If one of them cannot be read.
+    """
+    digest, found = sha256(), [Path(file) for file in instance.reads_for(scene)] if reads_files(instance) else []  # type: ignore[attr-defined]
+    for file in found:
+        try:
+            digest.update(f"{file}\0{digest_content(file)}\0".encode())
+        except OSError as error:
+            raise UserError(f"{file} cannot be read: {cause(error)}") from error
+        except NotPlain as error:
+            raise UserError(f"{file} cannot be read: {error}") from error
+    return digest.hexdigest() if found else ""
 
 
 def kernel_cache() -> Path:
     """The folder of compiled kernels: another one for each state of the code of all installed methods with kernels.
+
+    It is there, and can be written to (`matbench.plans.kernels.place`).
 
     numba notices a change of the file in which a kernel stands, by time and size, but not of other files whose kernels
     it calls. Therefore any change of what the code does leads to another folder. A changed comment does not.
     """
     every = [code_of(plugin) for _, plugin in sorted(installed("algorithms").items())]
     digests = [one.digest for one in every if "numba" in one.parts]
-    return kernels.home() / sha256(" ".join(digests).encode()).hexdigest()[:16]
+    return kernels.place(sha256(" ".join(digests).encode()).hexdigest()[:16])
+
+
+def built_in_algorithms() -> list[str]:
+    """The built-in methods without required parameters."""
+    built_in = [p for p in installed("algorithms").values() if p.source == OWN]
+    return [p.name for p in built_in if not parameters.required(p.load())]
 
 
 def default_algorithms() -> list[str]:
-    """The built-in methods without required parameters."""
-    built_in = [p for p in installed("algorithms").values() if p.source == "matbench-stereo"]
-    return [p.name for p in built_in if not parameters.required(p.load())]
+    """Those of them that run where no method is named: all that do not ask to be named (`Algorithm`, `by_default`)."""
+    return [name for name in built_in_algorithms() if getattr(installed("algorithms")[name].load(), "by_default", True)]
 
 
 def groups(algorithm: str) -> dict[str, str]:

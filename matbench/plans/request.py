@@ -1,10 +1,12 @@
 """A request as people write it: a TOML file of algorithms and scenes, and seeds."""
 
 import operator
-import tomllib
 from pathlib import Path
 
 from matbench.errors import UserError, unknown
+from matbench.files.toml import read_toml
+
+LARGEST_SEED = 2**64 - 1
 
 
 def read_request(path: Path) -> tuple[list[str], list[str] | None]:
@@ -15,12 +17,7 @@ def read_request(path: Path) -> tuple[list[str], list[str] | None]:
     UserError
         If the file is missing, is no TOML, or holds something else than the two lists.
     """
-    try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise UserError(f"{path} is not TOML: {error}") from error
+    found = read_toml(path, "request")
     for key, value in found.items():
         if key not in ("algorithms", "scenes"):
             raise unknown(f"key in {path}", key, ("algorithms", "scenes"))
@@ -45,6 +42,6 @@ def seeds_of(seed: object) -> list[int]:
         found = [operator.index(one) for one in given if not isinstance(one, bool)]  # type: ignore[arg-type]
     except TypeError:
         found = []
-    if len(found) != len(given) or not found or min(found) < 0:
-        raise UserError(f"seed {seed!r} is not one or several whole numbers from 0")
+    if len(found) != len(given) or not found or min(found) < 0 or max(found) > LARGEST_SEED:
+        raise UserError(f"seed {seed!r} is not one or several whole numbers from 0 to {LARGEST_SEED}")
     return list(dict.fromkeys(found))

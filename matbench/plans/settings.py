@@ -1,5 +1,6 @@
 """How a plan is run: where the scenes are, what is kept of each cell besides its maps, and the limits of a cell."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
 
@@ -11,6 +12,10 @@ from matbench.plans import limits
 from matbench.plans.record_option import RecordOption
 
 Only = Literal["missing", "failed", "all"]
+
+
+def _names(given: Iterable[str]) -> tuple[str, ...]:
+    return tuple(given)
 
 
 @frozen
@@ -46,11 +51,18 @@ class Settings:
     steady
         At the end, solve the cells again whose seconds are in doubt because others took the processors meanwhile.
         These run one at a time. Not with `dask`.
+    published
+        Show scores as published beside those of scenes that were judged alike. Nothing of a cell depends on it.
+    metrics
+        Names of metrics to compute besides those of every run, such as ``bad_3``; the first is what methods are
+        ranked by. If none are named, what the scenes' benchmark reports. Nothing of a cell depends on it.
+    against
+        Folder of an earlier run: what has changed since is told, too. Nothing of a cell depends on it.
 
     Raises
     ------
     UserError
-        For a limit or a count that makes no sense, and for `steady` with `dask`.
+        For a limit, a count or an address that makes no sense, and for `steady` with `dask`.
     """
 
     data: Path | None = None
@@ -62,8 +74,11 @@ class Settings:
     jobs: int = field(default=1, converter=limits.jobs)
     threads: int | None = field(default=None, converter=limits.threads)
     isolation: str = field(default="process", converter=limits.isolation)
-    dask: str | None = None
+    dask: str | None = field(default=None, converter=limits.scheduler)
     steady: bool = False
+    published: bool = False
+    metrics: tuple[str, ...] = field(default=(), converter=_names)
+    against: Path | None = None
 
     def __attrs_post_init__(self) -> None:
         if self.steady and self.dask is not None:

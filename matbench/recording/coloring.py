@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from matbench import drawing
 from matbench.measures.metrics import error_map
 from matbench.scene import Scene
 
@@ -24,9 +25,7 @@ Picture = NDArray[np.uint8]
 @cache
 def palette(name: str, levels: int = 256) -> NDArray[np.uint8]:
     """(levels, 3) RGB of one of matplotlib's colour maps."""
-    from matplotlib import colormaps
-
-    table = np.rint(255 * colormaps[name](np.linspace(0, 1, levels))[:, :3])
+    table = np.rint(255 * drawing.load().colormaps[name](np.linspace(0, 1, levels))[:, :3])
     return np.asarray(table, np.uint8)
 
 

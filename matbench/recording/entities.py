@@ -131,7 +131,7 @@ class EntityLogger:
         self.log("surface", "points", what=rr.Points3D(points, colors=colors, radii=radii))
         for index, label in enumerate(scene.labels):
             camera = ("surface", "cameras", label)
-            where = rr.Transform3D(translation=((index - scene.ref) * perspective.baseline, 0.0, 0.0))
+            where = rr.Transform3D(translation=(scene.steps(index) * perspective.baseline, 0.0, 0.0))
             self.log(*camera, what=where)
             width, height = float(scene.width), float(scene.height)
             eye = rr.Pinhole(focal_length=width, width=width, height=height, image_plane_distance=0.15)
@@ -171,14 +171,16 @@ class EntityLogger:
     def as_volume(self, disparity: NDArray[np.float32]) -> Volume:
         """A map of the reference view as a volume, for methods that have none."""
         scene = self.scene
-        space = DisparitySpace.covering(scene.disparities, scene.n, scene.height, scene.width)
-        return surface(space, {scene.ref: disparity}, tuple(range(scene.n)))
+        views = tuple(range(scene.n)) if scene.is_even else (scene.ref,)  # a space's views lie at even steps
+        space = DisparitySpace.covering(scene.disparities, len(views), scene.height, scene.width)
+        return surface(space, {views.index(scene.ref): disparity}, views)
 
     def log_space(self, volume: Volume, disparity: NDArray[np.float32], is_material: bool) -> None:
         """The answer in disparity space: voxels, the views' frustums, some planes, and rays that meet in one point."""
         scene, contents, space = self.scene, self.contents, volume.space
         row = min(self.shown[0], space.rows - 1)
-        step = volume.views[1] - volume.views[0]  # the space's disparities are per step of its own views
+        # the space's disparities are per step of its own views
+        step = volume.views[1] - volume.views[0] if len(volume.views) > 1 else 1
         whole = reduction.reduce_volume(volume, row)
         cells = space_diagram.voxels(whole, MATERIAL, VOXELS, (self.ends[0] * step, self.ends[1] * step))
         grid = rr.VoxelGridMap(cells.indices, cells.size, colors=cells.colors, translation=cells.origin)

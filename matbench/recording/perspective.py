@@ -95,7 +95,7 @@ class Perspective:
             (place - (size - 1) / 2) / scene.width * z
             for place, size in zip(pixel, (scene.height, scene.width), strict=True)
         )
-        centre, reach = (view - scene.ref) * self.baseline, max(last, z) / z
+        centre, reach = scene.steps(view) * self.baseline, max(last, z) / z
         return [(centre, 0.0, 0.0), (x, y, z), (centre + (x - centre) * reach, y * reach, z * reach)]
 
     def eye(self, points: NDArray[np.float32]) -> Eye | None:

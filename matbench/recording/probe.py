@@ -10,6 +10,7 @@ from matbench.algorithm import Probe
 from matbench.plans.record_option import RecordOption
 from matbench.recording import reduction
 from matbench.recording.reduction import ReducedVolume
+from matbench.safe_text import printable
 from matbench.space import Volume, visibility
 
 TOLD_VOLUMES = 12  # volumes kept by name; further names are dropped, as a method may tell one for every pair
@@ -86,6 +87,7 @@ class CapturingProbe(Probe):
     _stride: int = 1
 
     def volume(self, name: str, volume: Volume) -> None:
+        name = printable(name)
         if self.wanted.slices and name.startswith("similarity/"):
             self.latest = self.slices_of(volume)
             self.similarities[name] = reduction.as_bytes(self.latest.values)
@@ -101,7 +103,7 @@ class CapturingProbe(Probe):
         disparity: NDArray[np.float32] | None = None,
     ) -> None:
         for name, value in energies.items():
-            self.energies.setdefault(name, []).append((step, float(value)))
+            self.energies.setdefault(printable(name), []).append((step, float(value)))
         if (volume is None and derivative is None and disparity is None) or not self.wanted.passes:
             return
         if not self.wanted.slices:

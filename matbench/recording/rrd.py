@@ -47,6 +47,7 @@ import rerun as rr
 from rerun.error_utils import RerunWarning
 
 from matbench.algorithm import Estimate, Probe
+from matbench.files.writing import move
 from matbench.plans.record_option import RecordOption
 from matbench.recording import blueprint
 from matbench.recording.entities import EntityLogger, contents_text
@@ -144,7 +145,7 @@ def staged(path: Path) -> Iterator[Path]:
             yield beside
         finally:
             rr.set_strict_mode(before)
-        beside.replace(path)
+        move(beside, path)
 
 
 def new_stream(path: Path, title: str) -> rr.RecordingStream:

@@ -5,7 +5,6 @@ nothing in it is executed, and whatever does not have the right types is refused
 """
 
 import json
-import zipfile
 from pathlib import Path
 from typing import Any, get_origin
 
@@ -15,6 +14,8 @@ from cattrs.preconf.json import make_converter
 from numpy.typing import NDArray
 
 from matbench.algorithm import Estimate
+from matbench.files.arrays import opened_arrays
+from matbench.files.documents import parse_json
 from matbench.recording.probe import CapturingProbe
 
 _MOST_BYTES = 1 << 32  # of all arrays, unpacked
@@ -54,13 +55,12 @@ def read_told(path: Path) -> Told:
         If the file holds something else.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            if sum(info.file_size for info in archive.infolist()) > _MOST_BYTES:
+        with opened_arrays(path, follow=False) as arrays:
+            if arrays.bytes > _MOST_BYTES:
                 raise ValueError(f"it unpacks to more than {_MOST_BYTES} bytes")
-        with np.load(path, allow_pickle=False) as arrays:
             converter = make_converter()
-            converter.register_structure_hook_func(_is_array, lambda name, _: arrays[str(name)])
-            return converter.structure(json.loads(str(arrays[_FACTS])), Told)
+            converter.register_structure_hook_func(_is_array, lambda name, _: arrays.read(str(name)))
+            return converter.structure(parse_json(str(arrays.read(_FACTS)).encode()), Told)
     except Exception as error:  # whatever damaged archives, arrays and JSON raise
         raise ValueError(f"what the method told cannot be read: {error}") from error
 

@@ -1,16 +1,22 @@
 """Opening a recording in the rerun viewer, in a window or in a browser."""
 
 import os
+import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
-from contextlib import closing
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import quote
 
+from matbench import linux
 from matbench.errors import UserError
+
+_PATIENCE = 5.0  # seconds that the viewer has to end when it is told to
 
 
 def view(path: Path, web: bool = False) -> None:
@@ -37,19 +43,58 @@ def view(path: Path, web: bool = False) -> None:
     if web:
         # this machine only: by default it listens on all interfaces, and anybody could open the recording
         command += ["--web-viewer", "--bind", "127.0.0.1", "--web-viewer-port", str(ports[1])]
-    quiet = {"RUST_LOG": "error", **os.environ}
-    with subprocess.Popen(command, env=quiet) as viewer:  # noqa: S603
-        try:
+    # its analytics complain where there is no home folder
+    quiet = {"RUST_LOG": "error,re_analytics=off", **os.environ}
+    try:
+        with _ended_by_signals(), _running(command, quiet) as viewer:
             if web and _answers(ports[1], viewer):
                 source = quote(f"rerun+http://127.0.0.1:{ports[0]}/proxy", safe="")
                 print(f"http://127.0.0.1:{ports[1]}/?url={source}  (Ctrl-C ends)", flush=True)
             status = viewer.wait()
-        except KeyboardInterrupt:
-            viewer.terminate()
-            return
+    except KeyboardInterrupt:
+        return
     if status != 0:
         advice = "" if web else "; add --web to view the recording in a browser"
         raise UserError(f"the rerun viewer ended with status {status}{advice}")
+
+
+@contextmanager
+def _running(command: Sequence[str], environment: Mapping[str, str]) -> Iterator[subprocess.Popen[bytes]]:
+    """A program that ends with the block, and with this process however that ends (Linux)."""
+    process = os.getpid()
+    # the function that runs before the program does nothing but two calls of the system
+    program = subprocess.Popen(  # noqa: S603
+        command,
+        env=environment,
+        preexec_fn=lambda: linux.die_with_parent(process),
+    )
+    try:
+        yield program
+    finally:
+        program.terminate()
+        try:
+            program.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            program.kill()
+            program.wait(_PATIENCE)
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Have SIGTERM and SIGHUP, as of a terminal that is closed, end the block; they end the process only afterwards."""
+    if threading.current_thread() is not threading.main_thread():  # others cannot be asked
+        yield
+        return
+    before = {number: signal.signal(number, _leave) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _leave(number: int, _: object) -> None:
+    raise SystemExit(128 + number)
 
 
 def _executable() -> Path:

@@ -3,14 +3,14 @@
 from collections.abc import Mapping, Sequence
 
 import pandas as pd
-from attrs import asdict
 
 from matbench.errors import UserError
-from matbench.measures.statistics import paired_effect
+from matbench.measures.statistics import paired_effects, together
 from matbench.plans.plan import Method, Plan
 from matbench.results.comparable import SILENT, counted, is_enough
 from matbench.results.sweeps import is_swept
-from matbench.spec import Value, expand, read_scene, text
+from matbench.spec import expand, text, witness
+from matbench.typed import Value
 
 COLUMNS = (
     "algorithm",
@@ -25,7 +25,9 @@ COLUMNS = (
     "high",
     "effect_size",
     "scenes",
+    "p",
     "verdict",
+    "enough",
     "answered",
 )
 
@@ -34,7 +36,7 @@ def factors(methods: Sequence[Method]) -> dict[str, dict[str, list[Value]]]:
     """Algorithm -> parameter -> its values, for each parameter that varies; the first value is the base."""
     found: dict[str, dict[str, list[Value]]] = {}
     for method in methods:
-        levels = found.setdefault(method.algorithm, {})
+        levels = found.setdefault(method.names[0], {})
         for name, value in method.params.items():
             known = levels.setdefault(name, [])
             if value not in known:
@@ -80,17 +82,22 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     Columns `COLUMNS`. `change` is the mean of level minus base in `unit`; `low` and `high` are its interval; the
-    rest is as in `matbench.measures.statistics.Effect`. `answered` is the per cent of the pixels that the value is
-    over, for the level that answers less. Below `matbench.measures.metrics.ENOUGH` the verdict is `SILENT`.
+    rest is as in `matbench.measures.statistics.Effect`. All changes of one metric in one region are judged beside each
+    other (`matbench.measures.statistics.together`). `answered` is the per cent of the pixels that the value is over,
+    for the level that answers less. Below `matbench.measures.metrics.ENOUGH` the verdict is `SILENT`.
     """
     methods = list({str(cell.method): cell.method for cell in plan.cells}.values())
-    by_label = {(method.algorithm, method.changed): method for method in methods}
+    by_label = {method.names: method for method in methods}
     results = results[counted(results)]
     if "answered" not in results:  # tables of earlier versions
         results = results.assign(answered=float("nan"))
-    rows = []
+    heads: list[tuple[object, ...]] = []
+    answered: list[float] = []
+    changes: list[list[float]] = []
     for algorithm, levels in factors(methods).items():
         mine = results[results["algorithm"] == algorithm]
+        if mine.empty:  # as where a run was interrupted early
+            continue
         for factor, values in levels.items():
             wide = _levels_side_by_side(mine, by_label, factor)
             for level in values[1:]:
@@ -102,11 +109,26 @@ def ablation(plan: Plan, results: pd.DataFrame) -> pd.DataFrame:
                 both = wide["answered"][[base, other]].to_numpy(float)
                 shares = pd.DataFrame(both, wide.index).groupby(list(_HEADS), sort=False).mean().min(axis=1).to_dict()
                 for names, over_scenes in change.groupby(list(_HEADS), sort=False):
-                    effect, answered = paired_effect(over_scenes.to_list()), float(shares[names])
-                    verdict = effect.verdict if is_enough(answered) else SILENT
-                    head = (algorithm, factor, base.partition("=")[2], other.partition("=")[2], *names)
-                    rows.append((*head, *asdict(effect).values(), verdict, answered))
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+                    heads.append((algorithm, factor, base.partition("=")[2], other.partition("=")[2], *names))
+                    changes.append(over_scenes.to_list())
+                    answered.append(float(shares[names]))
+    effects = together(paired_effects(changes), [tuple(head[4:]) for head in heads])
+    rows = [
+        (
+            *head,
+            e.mean,
+            e.low,
+            e.high,
+            e.size,
+            e.scenes,
+            e.p,
+            e.verdict if is_enough(share) else SILENT,
+            e.enough,
+            share,
+        )
+        for head, e, share in zip(heads, effects, answered, strict=True)
+    ]
+    return pd.DataFrame(rows, columns=list(COLUMNS)).astype({"enough": float})
 
 
 _HEADS = ("region", "metric", "unit")
@@ -129,7 +151,7 @@ def _levels_side_by_side(results: pd.DataFrame, methods: Mapping[tuple[str, str]
     level = [text({factor: methods[label].params[factor]}) for label in labels]
     rest = [text({k: v for k, v in methods[label].params.items() if k != factor}) for label in labels]
     # with noise or in half size it is still the same scene, and no second witness
-    shown = results["scene"].map(lambda scene: read_scene(str(scene)).name)
+    shown = results["scene"].astype(str).map(witness)
     keys = ["rest", "shown", "scene", "seed", "region", "metric", "unit"]
     known = results.assign(level=level, rest=rest, shown=shown)
     return known.pivot(index=keys, columns="level", values=["value", "answered"])

@@ -2,17 +2,18 @@
 
 import json
 import re
-import shlex
 import stat
 import tempfile
 from collections.abc import Iterator
-from hashlib import sha256
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 
 from matbench._version import __version__
 from matbench.errors import UserError
 from matbench.files import unzip
+from matbench.files.documents import read_json
+from matbench.files.plain import digest_plain, open_plain
+from matbench.files.writing import drafted, is_writable
 from matbench.plans.plan import Cell
 from matbench.results import freshness
 from matbench.runs.lock import locked
@@ -28,15 +29,17 @@ TOP = (
     "ablation.csv",
     "ablation.tex",
     "reliability.csv",
+    "sparsification.csv",
     "report.html",
 )
 """The files of a run folder that are exported, besides the cells."""
-CELL = ("cell.json", "disparity.npz", "volume.npz", "log.txt")
+CELL = ("cell.json", "disparity.npz", "confidence.npz", "volume.npz", "log.txt")
 """The files of a cell that are exported. Recordings are not: they are large, and no score depends on them."""
 
 _NAME = re.compile(rf"({'|'.join(map(re.escape, TOP))})|cells/[0-9a-f]{{16}}/({'|'.join(map(re.escape, CELL))})")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the same time for all members: an archive's bytes do not depend on when it is written
 _MOST = 1 << 26  # bytes of a manifest
+_FREE, _RATIO = 1 << 28, 100  # an archive unpacks to at most so many bytes, or so many times its size
 _CHUNK = 1 << 20
 
 
@@ -44,6 +47,11 @@ def files_of(store: Store, cell: Cell) -> list[Path]:
     """The files of a cell to export. Links are left out: one could lead to any file on this machine."""
     place = store.cell(cell)
     return [] if place.is_symlink() else [path for name in CELL if _is_plain(path := place / name)]
+
+
+def tables_of(store: Store) -> list[Path]:
+    """The files of a run to export, besides its cells. Links are left out."""
+    return [path for name in TOP if _is_plain(path := store.folder / name)]
 
 
 def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
@@ -56,7 +64,8 @@ def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
     Parameters
     ----------
     out
-        Path of the archive; beside the folder if not given. An archive that exists there is replaced.
+        Path of the archive. If not given, it is put beside the folder, or where this user may not write there,
+        into the working folder. An archive that exists there is replaced.
 
     Returns
     -------
@@ -73,16 +82,17 @@ def export(folder: Path, out: Path | None = None) -> tuple[Path, int]:
     # the folder "." has no name of its own
     named = folder if folder.name else folder.resolve()
     place = out or named.with_name(f"{named.name}.zip")
+    if out is None and not is_writable(place.parent):
+        place = Path(place.name)
     # an earlier export may be replaced, but never a file of another kind
     if place.exists() and not _is_archive(place):
         raise UserError(f"{str(place)!r} is there already and is no exported run: name another file by --out")
     with locked(folder):
         if why := freshness.fault(plan, store):
-            raise UserError(
-                f"the tables of {str(folder)!r} are stale, {why}: type matbench score {shlex.quote(str(folder))} first"
-            )
+            then = "first" if is_writable(folder) else "and export that"
+            raise UserError(f"{freshness.stale(folder, why)} {then}")
         done = [cell for cell in plan.cells if store.read(cell).outcome is not None]
-        paths = [path for name in TOP if _is_plain(path := folder / name)]
+        paths = tables_of(store)
         paths += [path for cell in done for path in files_of(store, cell)]
         _write(place, folder, sorted(paths))
     return place, len(plan.cells) - len(done)
@@ -104,11 +114,12 @@ def unpack(path: Path, folder: Path) -> None:
             if set(manifest) != set(members):
                 odd = sorted(set(manifest) ^ set(members))[0]
                 raise unzip.ArchiveError(f"{odd} stands only in the manifest, or is only in the archive")
+            left = max(_FREE, _RATIO * path.stat().st_size)
             for name, info in members.items():
                 target = folder / name
                 target.parent.mkdir(exist_ok=True)
-                unzip.unpack(archive, info, target, limit=info.file_size)
-                if _sha256(target) != manifest[name]:
+                left -= unzip.unpack(archive, info, target, limit=min(left, info.file_size))
+                if digest_plain(target) != manifest[name]:
                     raise unzip.ArchiveError(f"{name} is not what it was when the run was exported")
     except unzip.ArchiveError as error:
         raise UserError(f"{str(path)!r} cannot be used: {error}") from error
@@ -133,9 +144,9 @@ def _manifest(archive: ZipFile, info: ZipInfo, folder: Path) -> dict[str, str]:
         target = Path(place) / MANIFEST
         unzip.unpack(archive, info, target, limit=_MOST)
         try:
-            files = json.loads(target.read_text(encoding="utf-8"))["files"]
+            files = read_json(target, most=_MOST)["files"]
             return {str(name): str(facts["sha256"]) for name, facts in files.items()}
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise unzip.ArchiveError(f"its {MANIFEST} is damaged") from error
 
 
@@ -156,25 +167,19 @@ def _is_plain(path: Path) -> bool:
 
 
 def _write(place: Path, folder: Path, paths: list[Path]) -> None:
-    files = {p.relative_to(folder).as_posix(): {"sha256": _sha256(p), "bytes": p.stat().st_size} for p in paths}
+    files = {
+        p.relative_to(folder).as_posix(): {"sha256": digest_plain(p, follow=False), "bytes": p.stat().st_size}
+        for p in paths
+    }
     manifest = json.dumps({"matbench": __version__, "files": files}, indent=1)
-    # written beside its place and then moved: an archive is never seen half-written
-    with tempfile.NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
-        draft = Path(file.name)
-        try:
-            with ZipFile(file, "w") as archive:
-                archive.writestr(_info(MANIFEST), manifest)
-                for path in paths:
-                    info = _info(path.relative_to(folder).as_posix())
-                    info.file_size = path.stat().st_size
-                    with archive.open(info, "w") as member:
-                        for chunk in _chunks(path):
-                            member.write(chunk)
-            draft.chmod(0o644)
-            draft.replace(place)
-        except BaseException:
-            draft.unlink(missing_ok=True)
-            raise
+    with drafted(place) as file, ZipFile(file, "w") as archive:
+        archive.writestr(_info(MANIFEST), manifest)
+        for path in paths:
+            info = _info(path.relative_to(folder).as_posix())
+            info.file_size = path.stat().st_size
+            with archive.open(info, "w") as member:
+                for chunk in _chunks(path):
+                    member.write(chunk)
 
 
 def _info(name: str) -> ZipInfo:
@@ -186,13 +191,6 @@ def _info(name: str) -> ZipInfo:
 
 
 def _chunks(path: Path) -> Iterator[bytes]:
-    with path.open("rb") as file:
+    with open_plain(path, follow=False) as file:
         while chunk := file.read(_CHUNK):
             yield chunk
-
-
-def _sha256(path: Path) -> str:
-    digest = sha256()
-    for chunk in _chunks(path):
-        digest.update(chunk)
-    return digest.hexdigest()

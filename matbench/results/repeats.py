@@ -7,8 +7,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench.plans.plan import Cell
+from matbench.runs.cell_files import Solved
 from matbench.runs.outcome import FINAL, Outcome
-from matbench.runs.store import Solved
 
 
 @frozen
@@ -20,7 +20,7 @@ class Repeats:
     asked, solved
         How many solves were asked for, and how many ended ``ok``.
     answers
-        How many different maps there were.
+        How many different answers there were: other maps, or another confidence.
     differ
         Share of the pixels at which some solve differs from the first.
     failed
@@ -47,7 +47,7 @@ class Repeats:
         """How its answers differ, as a line; empty if they do not."""
         if self.answers < 2:
             return ""
-        differ = f"which differ in {100 * self.differ:.3g} % of the pixels"
+        differ = f"which differ in {100 * self.differ:.3g} % of the pixels" if self.differ else "of other confidence"
         return f"{self.cell}: {self.solved} solves gave {self.answers} answers, {differ}"
 
 
@@ -63,7 +63,7 @@ def judged(cell: Cell, asked: int, solves: Iterable[Solved]) -> Repeats:
             continue
         solved += one.outcome.status == "ok"
         timed += [one.outcome] if one.outcome.status == "ok" and one.outcome.seconds is not None else []
-        answers |= {one.outcome.maps} - {""}
+        answers |= {one.outcome.answer} - {""}
         # a failure of the first solve is the status of the cell itself
         if one.cell.repeat and one.outcome.status not in FINAL and failed is None:
             failed = one.cell, one.outcome

@@ -1,7 +1,6 @@
 """Tables of a run, computed from its stored maps: no method runs again for a new metric."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
 from itertools import chain
 from pathlib import Path
 from statistics import median
@@ -11,19 +10,20 @@ import pandas as pd
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from matbench.errors import UserError, unknown
-from matbench.measures.metrics import Metric, score, value_of
+from matbench.errors import UserError
+from matbench.files.csv_tables import most_bytes, read_csv
+from matbench.measures.confidence import ConfidenceMetric, RankedErrors, sparsification
+from matbench.measures.metrics import Errors, Metric, score, signed_error_map, value_of
 from matbench.measures.prediction import PredictionMetric, differences
 from matbench.measures.volume_metrics import VolumeMetric, reliability, told
 from matbench.measures.volumes import StoredVolume, rays_of
-from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
+from matbench.results.metric_catalogue import AnyMetric, wanted
 from matbench.results.repeats import Repeats, judged
-from matbench.runs.outcome import Outcome
-from matbench.runs.store import Solved, Store
+from matbench.runs.cell_files import Solved
+from matbench.runs.outcome import DEVICE, Outcome
+from matbench.runs.store import Store
 from matbench.scene import Scene
-
-AnyMetric = Metric | VolumeMetric | PredictionMetric
 
 RESULT_COLUMNS = (
     "algorithm",
@@ -60,6 +60,7 @@ CELL_COLUMNS = (
     "repeats",
     "seconds_least",
     "seconds_most",
+    *DEVICE,
 )
 _NUMBERS = (
     "seed",
@@ -72,73 +73,11 @@ _NUMBERS = (
     "others_seconds",
     "seconds_least",
     "seconds_most",
+    *DEVICE,
 )
+_LARGEST = 1e100
 RELIABILITY_COLUMNS = ("algorithm", "params", "scene", "seed", "materiality", "observed", "points")
-
-
-def metrics() -> tuple[AnyMetric, ...]:
-    """All metrics: built-in ones, then those of installed plug-ins, then those of users' own files in use.
-
-    Broken plug-ins are left out (`broken_metrics`).
-
-    Raises
-    ------
-    UserError
-        If a metric in a user's own file is of no known kind, or its name is taken.
-    """
-    found = {metric.name: metric for metric in _installed()[0]}
-    for file in plugins.used():
-        for metric in plugins.own_metrics(file):
-            if not isinstance(metric, AnyMetric):
-                raise UserError(f"{file}: {type(metric).__name__} is no metric: make it of matbench.Metric")
-            # an equal metric under the same name is no clash: a file may import a built-in one
-            if found.setdefault(metric.name, metric) != metric:
-                raise UserError(f"{file}: the name of metric {metric.name!r} is taken; give it another one")
-    return tuple(found.values())
-
-
-def metric_named(name: str) -> AnyMetric:
-    """The metric of that name.
-
-    Raises
-    ------
-    UserError
-        If there is no such metric.
-    """
-    known = {metric.name: metric for metric in metrics()}
-    if name not in known:
-        raise unknown("metric", name, known)
-    return known[name]
-
-
-def broken_metrics() -> Mapping[str, str]:
-    """Installed plug-in -> what is wrong with it, if it cannot be imported or offers no metric of a new name."""
-    return _installed()[1]
-
-
-@cache
-def _installed() -> tuple[tuple[AnyMetric, ...], Mapping[str, str]]:
-    found: dict[str, AnyMetric] = {}
-    broken: dict[str, str] = {}
-    # built-in metrics first: no plug-in can take one of their names
-    by_source = sorted(plugins.installed("metrics").values(), key=lambda p: p.source != "matbench-stereo")
-    for plugin in by_source:
-        try:
-            loaded = plugin.load()
-            offered = [loaded] if isinstance(loaded, AnyMetric) else list(loaded)
-        except (UserError, TypeError) as error:
-            broken[plugin.name] = str(error)
-            continue
-        if all(isinstance(metric, AnyMetric) and metric.name not in found for metric in offered):
-            found |= {metric.name: metric for metric in offered}
-        else:
-            broken[plugin.name] = f"plug-in {plugin.name!r} from {plugin.source} offers no Metric of a new name"
-    return tuple(found.values()), broken
-
-
-def of_volumes(name: str) -> bool:
-    """Does a metric need the volumes of the cells?"""
-    return any(metric.name == name and isinstance(metric, VolumeMetric) for metric in metrics())
+SPARSIFICATION_COLUMNS = ("algorithm", "params", "scene", "seed", "coverage", "risk", "best", "pixels")
 
 
 @frozen(eq=False)
@@ -159,6 +98,9 @@ class Tables:
     reliability
         The reliability curve of every volume that was kept, over the reference view's known truth: algorithm, params,
         scene, seed, and the columns of `matbench.measures.volume_metrics.reliability`.
+    sparsification
+        The curve of risk over coverage of every confidence map, over the reference view's known truth: algorithm,
+        params, scene, seed, and what `matbench.measures.confidence.sparsification` gives.
     unsteady
         The cells whose repeats differ, a line each.
     outcomes
@@ -168,12 +110,18 @@ class Tables:
     results: pd.DataFrame
     cells: pd.DataFrame
     reliability: pd.DataFrame
+    sparsification: pd.DataFrame
     unsteady: tuple[str, ...] = ()
     outcomes: Mapping[str, Outcome] = field(factory=dict)
 
 
-def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
+def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene], names: Sequence[str] = ()) -> Tables:
     """Score a run. Every cell is read only once, so that its rows in all tables belong to the same solve.
+
+    Parameters
+    ----------
+    names
+        Metrics besides those of every run (`wanted`).
 
     Raises
     ------
@@ -183,11 +131,15 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
     rows: list[tuple[object, ...]] = []
     lines: list[tuple[object, ...]] = []
     curves: list[pd.DataFrame] = []
+    risks: list[tuple[object, ...]] = []
     unsteady: list[str] = []
     outcomes: dict[str, Outcome] = {}
+    used = wanted(names)
 
     def read(cell: Cell) -> Solved:
-        solved = store.read(cell)
+        scene = scenes[cell.scene]
+        # what belongs to another scene is refused below, in words
+        solved = store.read(cell, scene if scene.digest == cell.scene_digest else None)
         if solved.outcome is not None:
             outcomes[cell.key] = solved.outcome
         return solved
@@ -200,8 +152,11 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
         unsteady += [repeats.unsteady] if repeats is not None and repeats.unsteady else []
         if solved.maps:
             _check_scene(solved, scene)
-            rows += _scored(solved, scene)
+            truth = scene.truth.get(scene.ref)
+            error = None if truth is None else signed_error_map(solved.maps[scene.ref], truth, scene.pair_steps)
+            rows += _scored(solved, scene, used, error)
             curves += _curve(solved, scene)
+            risks += _risks(solved, scene, error)
     cells = pd.DataFrame(lines, columns=list(CELL_COLUMNS))
     # pandas would take a column without any number for one of objects; `read` takes it for one of numbers
     nowhere = [name for name in _NUMBERS if cells[name].isna().all()]
@@ -209,43 +164,59 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene]) -> Tables:
         pd.DataFrame(rows, columns=list(RESULT_COLUMNS)),
         cells.astype(dict.fromkeys(nowhere, float)),
         pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(columns=list(RELIABILITY_COLUMNS)),
+        pd.DataFrame(risks, columns=list(SPARSIFICATION_COLUMNS)),
         tuple(unsteady),
         outcomes,
     )
 
 
 def read(folder: Path, unsteady: tuple[str, ...], outcomes: Mapping[str, Outcome]) -> Tables:
-    """The tables as they lie in a run folder: the same types as `tables` gave, and the same numbers to the last bit."""
+    """The tables as they lie in a run folder: the same types as `tables` gave, and the same numbers to the last bit.
+
+    Raises
+    ------
+    ValueError
+        If one of them is damaged.
+    """
+    most = most_bytes(len(outcomes))
     return Tables(
-        _read(folder / "results.csv", RESULT_COLUMNS, ("seed", "value", "pixels", "answered")),
-        _read(folder / "cells.csv", CELL_COLUMNS, _NUMBERS),
-        _read(folder / "reliability.csv", RELIABILITY_COLUMNS, ("seed", "materiality", "observed", "points")),
+        _read(folder / "results.csv", RESULT_COLUMNS, ("seed", "value", "pixels", "answered"), most),
+        _read(folder / "cells.csv", CELL_COLUMNS, _NUMBERS, most),
+        _read(folder / "reliability.csv", RELIABILITY_COLUMNS, RELIABILITY_COLUMNS[3:], most),
+        _read(folder / "sparsification.csv", SPARSIFICATION_COLUMNS, SPARSIFICATION_COLUMNS[3:], most),
         unsteady,
         outcomes,
     )
 
 
-def _read(path: Path, columns: Sequence[str], numbers: Sequence[str]) -> pd.DataFrame:
+def _read(path: Path, columns: Sequence[str], numbers: Sequence[str], most: int) -> pd.DataFrame:
     if not path.exists():
         return pd.DataFrame(columns=list(columns))
-    # read as texts: a method may be called "nan", and the parser of pandas may change a number's last bit
-    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    table = read_csv(path, columns, most)
     return table.assign(**{name: [_number(text) for text in table[name]] for name in numbers})
 
 
 def _number(text: str) -> float | bool:
     if text in ("True", "False"):
         return text == "True"
-    return int(text) if text.removeprefix("-").isdigit() else float(text or "nan")
+    number = int(text) if text.removeprefix("-").isdigit() else float(text or "nan")
+    if abs(number) > _LARGEST:
+        raise ValueError(f"{text} is no number that a table holds")
+    return number
 
 
-def _scored(solved: Solved, scene: Scene) -> Iterator[tuple[object, ...]]:
-    """A cell's rows of the table of results."""
+def _scored(
+    solved: Solved, scene: Scene, metrics: Sequence[AnyMetric], error: Errors | None
+) -> Iterator[tuple[object, ...]]:
+    """A cell's rows of the table of results; `error` is its `signed_error_map`, None without truth."""
     estimate = solved.maps[scene.ref]
-    yield from _of_maps(solved.cell, scene, estimate)
-    yield from _of_volumes(solved.cell, scene, solved.volume)
+    if error is not None:
+        yield from _of_maps(solved.cell, scene, estimate, [m for m in metrics if isinstance(m, Metric)], error)
+    yield from _of_volumes(solved.cell, scene, solved.volume, [m for m in metrics if isinstance(m, VolumeMetric)])
+    if error is not None:
+        yield from _of_confidence(solved, scene, [m for m in metrics if isinstance(m, ConfidenceMetric)], error)
     if scene.held_out is not None:
-        yield from _predicted(solved.cell, scene, estimate)
+        yield from _predicted(solved.cell, scene, estimate, [m for m in metrics if isinstance(m, PredictionMetric)])
 
 
 def _check_scene(solved: Solved, scene: Scene) -> None:
@@ -259,23 +230,26 @@ def _check_scene(solved: Solved, scene: Scene) -> None:
 
 
 def _head(cell: Cell, view: str, region: str) -> tuple[object, ...]:
-    return cell.method.algorithm, cell.method.changed, cell.scene, view, cell.seed, region
+    return *cell.method.names, cell.scene, view, cell.seed, region
 
 
-def _of_maps(cell: Cell, scene: Scene, estimate: NDArray[np.float32]) -> Iterator[tuple[object, ...]]:
-    used = [metric for metric in metrics() if isinstance(metric, Metric)]
+def _of_maps(
+    cell: Cell, scene: Scene, estimate: NDArray[np.float32], used: Sequence[Metric], error: Errors
+) -> Iterator[tuple[object, ...]]:
+    truth = scene.truth[scene.ref]
     for region, mask in scene.scored_regions.items():
-        truth, head = scene.truth[scene.ref], _head(cell, scene.labels[scene.ref], region)
-        values = score(estimate, truth, mask, scene.pair_steps, used, scene)
+        head = _head(cell, scene.labels[scene.ref], region)
+        values = score(estimate, truth, mask, scene.pair_steps, used, scene, error)
         known = mask & np.isfinite(truth)
         pixels, answered = int(known.sum()), _percent(np.isfinite(estimate[known]))
         yield from ((*head, m.name, values[m.name], m.unit, pixels, _over(m, answered)) for m in used)
 
 
-def _of_volumes(cell: Cell, scene: Scene, kept: StoredVolume | None) -> Iterator[tuple[object, ...]]:
+def _of_volumes(
+    cell: Cell, scene: Scene, kept: StoredVolume | None, used: Sequence[VolumeMetric]
+) -> Iterator[tuple[object, ...]]:
     if kept is None or scene.ref not in kept.views or scene.ref not in scene.truth:
         return
-    used = [metric for metric in metrics() if isinstance(metric, VolumeMetric)]
     masks = scene.scored_regions
     for region, rays in zip(masks, rays_of(kept, scene, masks.values()), strict=True):
         head, pixels = _head(cell, scene.labels[scene.ref], region), len(rays.surface)
@@ -283,10 +257,33 @@ def _of_volumes(cell: Cell, scene: Scene, kept: StoredVolume | None) -> Iterator
         yield from ((*head, m.name, value_of(m, rays, pixels), m.unit, pixels, _over(m, answered)) for m in used)
 
 
-def _predicted(cell: Cell, scene: Scene, estimate: NDArray[np.float32]) -> list[tuple[object, ...]]:
+def _of_confidence(
+    solved: Solved, scene: Scene, used: Sequence[ConfidenceMetric], error: Errors
+) -> Iterator[tuple[object, ...]]:
+    if (sure := solved.confidence.get(scene.ref)) is None:
+        return
+    for region, mask in scene.scored_regions.items():
+        known = mask & np.isfinite(scene.truth[scene.ref])
+        ranked = RankedErrors.of(error[known], sure[known])
+        head, pixels, count = _head(solved.cell, scene.labels[scene.ref], region), int(known.sum()), ranked.error.size
+        answered = 100.0 * count / pixels if pixels else float("nan")
+        yield from ((*head, m.name, value_of(m, ranked, count), m.unit, pixels, _over(m, answered)) for m in used)
+
+
+def _risks(solved: Solved, scene: Scene, error: Errors | None) -> Iterator[tuple[object, ...]]:
+    """The curve of risk over coverage of a cell's confidence, if it has one that can be judged."""
+    cell, sure = solved.cell, solved.confidence.get(scene.ref)
+    if sure is None or error is None:
+        return
+    for point in sparsification(RankedErrors.of(error, sure)):
+        yield *cell.method.names, cell.scene, cell.seed, *point
+
+
+def _predicted(
+    cell: Cell, scene: Scene, estimate: NDArray[np.float32], used: Sequence[PredictionMetric]
+) -> list[tuple[object, ...]]:
     assert scene.held_out is not None, "the caller has looked"  # noqa: S101
     found, head = differences(scene, estimate), _head(cell, scene.held_out.label, "all")
-    used = [metric for metric in metrics() if isinstance(metric, PredictionMetric)]
     answered = _percent(~np.isnan(found[:, 0]))
     return [(*head, m.name, value_of(m, found, len(found)), m.unit, len(found), _over(m, answered)) for m in used]
 
@@ -307,7 +304,7 @@ def _curve(solved: Solved, scene: Scene) -> list[pd.DataFrame]:
         return []
     (rays,) = rays_of(kept, scene, [np.isfinite(scene.truth[scene.ref])])
     curve = reliability(rays)
-    names = {"algorithm": cell.method.algorithm, "params": cell.method.changed}
+    names = dict(zip(("algorithm", "params"), cell.method.names, strict=True))
     return [pd.DataFrame({**names, "scene": cell.scene, "seed": cell.seed}, index=curve.index).join(curve)]
 
 
@@ -321,9 +318,9 @@ def _log_of(place: Path) -> str:
 def _line(solved: Solved, repeats: Repeats | None) -> tuple[object, ...]:
     """A cell's row of the table of cells."""
     cell, outcome, place = solved.cell, solved.outcome, solved.place
-    head = (cell.method.algorithm, cell.method.changed, cell.scene, cell.seed)
+    head = (*cell.method.names, cell.scene, cell.seed)
     if outcome is None:
-        return *head, "interrupted", *[None] * 7, "", "", "not computed yet", cell.key, "", "", "", None, None
+        return *head, "interrupted", *[None] * 7, "", "", "not computed yet", cell.key, "", "", "", *[None] * 4
     status, reason = outcome.status, outcome.reason
     if repeats is not None and repeats.failed is not None and status == "ok":
         repeat, failed = repeats.failed
@@ -339,4 +336,4 @@ def _line(solved: Solved, repeats: Repeats | None) -> tuple[object, ...]:
     cost = (taken, outcome.warmup_seconds, outcome.peak_mb, outcome.threads, counted[0].alone)
     share = (outcome.processor_seconds, outcome.others_seconds, counted[0].doubt)
     work = " ".join(f"{name}={count}" for name, count in outcome.work.items())
-    return *head, status, *cost, *share, work, reason, *told, *ends
+    return *head, status, *cost, *share, work, reason, *told, *ends, outcome.device_seconds, outcome.device_mb

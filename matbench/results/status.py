@@ -87,7 +87,7 @@ def standing(folder: Path) -> Standing:
         _guess(plan, outcomes, undone, {cell.key: spent for cell, spent in running}),
         len(stale),
         sum(path.lstat().st_size for cell in stale for path in store.cell(cell).rglob("*")),
-        freshness.fault(plan, store),
+        freshness.fault(plan, store, outcomes),
     )
 
 

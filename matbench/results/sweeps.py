@@ -14,7 +14,7 @@ import pandas as pd
 from attrs import frozen
 
 from matbench import spec
-from matbench.measures.statistics import FEW, intervals, paired_effects
+from matbench.measures.statistics import FEW, intervals, paired_effects, together
 from matbench.plans.plan import Method, Plan
 from matbench.results.comparable import SILENT, counted, is_enough
 from matbench.spec import Spec
@@ -40,6 +40,7 @@ COLUMNS = (
     "change_high",
     "scenes",
     "verdict",
+    "enough",
     "answered",
 )
 
@@ -70,8 +71,9 @@ class Sweep:
     curves
         Columns `COLUMNS`. `params` are the parameters that differ from their defaults, without the option
         itself. `mean` is over the scenes; `low` and `high` are its interval, NaN below `FEW` scenes. `change` is
-        the paired difference from the first value, with its interval and verdict as in
-        `matbench.measures.statistics.Effect`. `answered` is the per cent of the pixels that the mean is over. If it
+        the paired difference from the first value, with its interval, verdict and `enough` as in
+        `matbench.measures.statistics.Effect`; all changes of one metric in one region are judged beside each other
+        (`matbench.measures.statistics.together`). `answered` is the per cent of the pixels that the mean is over. If it
         is less than `matbench.measures.metrics.ENOUGH` at one of the two values, the verdict is `SILENT`. Only scenes
         on which a region counts at every value are used for it (`matbench.results.comparable.counted`).
     """
@@ -152,7 +154,7 @@ def _cells(plan: Plan) -> pd.DataFrame:
     for name, kept in plan.spellings.items():
         spelled[kept].append(name)
     rows = [
-        (c.method, c.method.algorithm, c.method.changed, c.scene, c.seed, one.name, one.options)
+        (c.method, *c.method.names, c.scene, c.seed, one.name, one.options)
         for c in plan.scored
         for one in map(spec.read_scene, spelled[c.scene])
     ]
@@ -217,7 +219,7 @@ def _sweep(
         tuple(str(scene) for scene in done.index[~done]),
         _moving(good),
         {} if of else _limits(methods.values(), option, values[-1]),
-        _curves(good, {curve: (m.algorithm, _without(m, option if of else "")) for curve, m in methods.items()}),
+        _curves(good, {curve: (m.names[0], _without(m, option if of else "")) for curve, m in methods.items()}),
     )
 
 
@@ -235,7 +237,7 @@ def _limits(methods: Iterable[Method], option: str, largest: float) -> dict[str,
 
 def _without(method: Method, option: str) -> str:
     """A method's label without one of its parameters."""
-    return " ".join(part for part in method.changed.split() if part.partition("=")[0] != option)
+    return " ".join(part for part in method.names[1].split() if part.partition("=")[0] != option)
 
 
 def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
@@ -250,14 +252,14 @@ def _curves(good: pd.DataFrame, labels: Mapping[str, tuple[str, str]]) -> pd.Dat
     shares = groups["answered"].mean().unstack("base")
     has = per_scene.notna().groupby(heads).transform("all")
     rows: list[tuple[object, ...]] = []
-    # there are few different sets of scenes, and all rows of one set share a bootstrap: that is much faster
+    # there are few different sets of scenes, and all rows of one set are computed at once: that is much faster
     for known in set(map(tuple, has.to_numpy().tolist())):
         part = per_scene.loc[(has == list(known)).all(axis=1), list(known)]
         if part.shape[1]:  # else the region is empty
             over = shares.loc[part.index, part.columns].mean(axis=1)
             for (*head, curve, value), line in zip(part.index, _lines(part, over), strict=True):
                 rows.append((*labels[str(curve)], value, *head, *line))
-    found = pd.DataFrame(rows, columns=list(COLUMNS))
+    found = pd.DataFrame(rows, columns=list(COLUMNS)).astype({"enough": float})
     # rows in the order in which the run has its methods, regions and metrics, not in that of the alphabet
     places = {"algorithm": [a for a, _ in labels.values()], "params": [p for _, p in labels.values()]}
     places |= {name: list(good[name].unique()) for name in ("region", "metric")}
@@ -277,16 +279,19 @@ def _lines(scores: pd.DataFrame, answered: pd.Series) -> list[tuple[object, ...]
     """
     numbers, count = scores.to_numpy(np.float64), scores.shape[1]
     curves = scores.groupby(["region", "metric", "unit", "curve"], sort=False)
+    first = scores.index.get_level_values("value") == scores.index.get_level_values("value").min()
     effects = paired_effects(list(numbers - curves.transform("first").to_numpy(np.float64)))
+    # the first value differs from itself by nothing: no difference to be judged
+    families = [None if is_first else tuple(key[:3]) for is_first, key in zip(first, scores.index, strict=True)]
+    effects = together(effects, families)
     means, nothing = numbers.mean(axis=1), np.full((2, len(scores)), nan)
     low, high = intervals(numbers) if count >= FEW else nothing
     least, most = zip(*((e.low, e.high) for e in effects), strict=True) if count >= FEW else nothing
     shifts = [effect.mean for effect in effects]
-    first = scores.index.get_level_values("value") == scores.index.get_level_values("value").min()
     lowest = np.fmin(answered, answered.groupby(["region", "metric", "unit", "curve"], sort=False).transform("first"))
     verdicts = [
         "" if is_first else effect.verdict if is_enough(share) else SILENT
         for is_first, effect, share in zip(first, effects, lowest, strict=True)
     ]
-    count_each = [count] * len(scores)
-    return list(zip(means, low, high, shifts, least, most, count_each, verdicts, answered, strict=True))
+    count_each, enough = [count] * len(scores), [effect.enough for effect in effects]
+    return list(zip(means, low, high, shifts, least, most, count_each, verdicts, enough, answered, strict=True))

@@ -5,21 +5,26 @@ import os
 import platform
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from math import isfinite
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from threading import get_ident
 
 from attrs import define, field
-from filelock import FileLock, Timeout
 
-from matbench.errors import UserError
+from matbench.errors import UserError, cause
+from matbench.files.documents import read_json
+from matbench.files.locking import Busy, held, is_held
+from matbench.files.remarks import remark_once
+from matbench.files.writing import move
+from matbench.safe_text import hidden_in
 
 LOCK, WORK = ".lock", ".work.json"
-"""Two files in a run folder. The first is locked; the system unlocks it when the process that holds it ends. The
-second says who holds the lock, for people to read."""
+"""Two files in a run folder. The first is locked, and so is the folder itself: its lock stays whatever is deleted in
+it, but NFS has none for folders. The second says who holds the locks, for people to read."""
 
+_MOST_BYTES, _LATEST = 1 << 20, 1e11  # of `WORK`; seconds since 1970, in some thousand years
 _PATIENCE = 2.0  # seconds to wait: another process that only asks `is_locked` holds the lock for a moment, too
+_STARTED = 1.0  # seconds by which clocks and the time at which a process was started may differ
 
 
 @define
@@ -57,19 +62,33 @@ class Work:
             draft.unlink(missing_ok=True)
             with draft.open("x", encoding="utf-8") as file:
                 json.dump(facts, file)
-            draft.replace(self.folder / WORK)
+            move(draft, self.folder / WORK)
+
+    @property
+    def is_alive(self) -> bool:
+        """Does the process that wrote this run on this machine? No if another one has its number by now."""
+        import psutil
+
+        if self.host != platform.node():
+            return False
+        with suppress(psutil.Error, ValueError, OverflowError):  # the number may be anything
+            process = psutil.Process(self.pid)
+            has_ended = process.status() == psutil.STATUS_ZOMBIE
+            return not has_ended and process.create_time() <= self.since + _STARTED
+        return False
 
     @classmethod
     def read(cls, folder: Path) -> "Work | None":
         """What the holder wrote last; None if there is no such file, or it holds something else."""
         try:
-            found = json.loads((folder / WORK).read_text(encoding="utf-8"))
+            found = read_json(folder / WORK, most=_MOST_BYTES)
             running = {str(key): float(begun) for key, begun in found["running"].items()}
             work = cls(folder, int(found["pid"]), str(found["host"]), float(found["since"]), running)
             # the folder may come from anywhere, and these facts are printed
-            is_plain = work.host.isprintable() and all(map(isfinite, (work.since, *running.values())))
+            times = (work.since, *running.values())
+            is_plain = not hidden_in(work.host) and work.pid > 0 and all(0 <= one <= _LATEST for one in times)
             return work if is_plain else None
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError):
             return None
 
 
@@ -80,7 +99,8 @@ _held: dict[tuple[Path, int], Work] = {}  # by folder and thread: only the threa
 def locked(folder: Path) -> Iterator[Work]:
     """Hold the lock of a run folder while the block runs. The thread that holds it may ask again.
 
-    The system frees the lock when the process ends, however it ends.
+    The system frees the lock when the process ends, however it ends. Where nothing can be locked, it is said once;
+    of processes on one machine, only one is let in all the same.
 
     Raises
     ------
@@ -92,41 +112,44 @@ def locked(folder: Path) -> Iterator[Work]:
     if key in _held:
         yield _held[key]
         return
-    lock = FileLock(place / LOCK)
-    try:
-        lock.acquire(timeout=_PATIENCE, poll_interval=0.05)
-    except Timeout as error:
-        raise UserError(f"run folder {str(folder)!r} is in use by {_holder(folder)}: wait for it, or end it") from error
-    except (OSError, NotImplementedError) as error:
-        raise UserError(f"run folder {str(folder)!r} cannot be locked: {error}") from error
-    work = _held[key] = Work(place)
-    work.tell()
-    try:
-        yield work
-    finally:
-        del _held[key]
-        with suppress(OSError):
-            (place / WORK).unlink(missing_ok=True)
-        with suppress(OSError):
-            lock.release()
+    with ExitStack() as stack:
+        try:
+            taken = stack.enter_context(held(place, place / LOCK, patience=_PATIENCE))
+            if place not in taken and _works_here(place):  # `LOCK` may have been deleted
+                raise Busy
+        except Busy:
+            raise UserError(
+                f"run folder {str(folder)!r} is in use by {_holder(folder)}: wait for it, or end it"
+            ) from None
+        except OSError as error:
+            raise UserError(f"run folder {str(folder)!r} cannot be locked: {cause(error)}") from error
+        if not taken:
+            remark_once(f"nothing can be locked in {str(folder)!r}: let no other machine work on it meanwhile")
+        work = _held[key] = Work(place)
+        work.tell()
+        try:
+            yield work
+        finally:
+            del _held[key]
+            with suppress(OSError):
+                (place / WORK).unlink(missing_ok=True)
 
 
 def is_locked(folder: Path) -> bool:
-    """Does a process work on a run folder? The answer is no where this process may not lock the folder."""
-    if (folder.resolve(), get_ident()) in _held:
+    """Does a process work on a run folder?"""
+    place = folder.resolve()
+    of_folder = is_held(place)
+    if of_folder is None:
+        return bool(is_held(place / LOCK)) or _works_here(place)
+    return of_folder or bool(is_held(place / LOCK))
+
+
+def _works_here(place: Path) -> bool:
+    """Is a process of this machine at work there, by what it says itself?"""
+    if any(place == one for one, _ in _held):
         return True
-    if not (folder / LOCK).exists():
-        return False
-    # the file stays when a run ends: only an attempt to lock it tells
-    lock = FileLock(folder / LOCK)
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        return True
-    except (OSError, NotImplementedError):
-        return False
-    lock.release()
-    return False
+    work = Work.read(place)
+    return work is not None and work.pid != os.getpid() and work.is_alive
 
 
 def _holder(folder: Path) -> str:

@@ -3,118 +3,53 @@
 import json
 import os
 import re
-import shutil
 import tempfile
-import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from errno import EISDIR, ELOOP, ENOENT, ENOTDIR, ENOTEMPTY
-from functools import cached_property
-from hashlib import sha256
-from math import isfinite
+from errno import EEXIST, EISDIR, ELOOP, ENOENT, ENOTDIR, ENOTEMPTY
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from cattrs.preconf.json import make_converter
 from numpy.typing import NDArray
 
-from matbench.errors import UserError
-from matbench.files.writing import write_text
+from matbench.errors import LONGEST_NAME, UserError, cause, refuse_hidden
+from matbench.files.documents import read_json
+from matbench.files.plain import NotPlain, digest_plain, read_plain
+from matbench.files.remarks import remark_once
+from matbench.files.removal import remove
+from matbench.files.writing import draft_folder, settle, write_text
 from matbench.measures.volumes import StoredVolume
 from matbench.plans.plan import Cell, Plan
-from matbench.runs import provenance
+from matbench.plans.request import LARGEST_SEED
+from matbench.runs.cell_files import MOST_FACTS, Solved, maps_digest, read_maps, read_volume
+from matbench.runs.cell_files import write_cell as write_cell  # its earlier place
 from matbench.runs.lock import LOCK, WORK, locked
 from matbench.runs.outcome import Outcome
+from matbench.runs.stopped import Stopped
+from matbench.safe_text import hidden_in, printable
+from matbench.scene import Scene
 
 KEY = re.compile(r"[0-9a-f]{16}")
 """What a cell's folder is called."""
 _DRAFT = re.compile(r"\.([0-9a-f]{16}|removed)\.\w+")
 _ABSENT = (ENOENT, ENOTDIR, EISDIR, ELOOP)  # no such file; after any other error there may well be one
-_MAP_BYTES = 1 << 32  # of all maps of a cell, unpacked
+_MOST_PLAN = 1 << 26  # bytes; some fifty thousand cells
+_MOST_REPEATS = 1 << 20
 
-_json = make_converter()
-
-
-@frozen(eq=False)
-class Solved:
-    """A stored cell. Its facts and its maps are read together, so they belong to the same solve.
-
-    Parameters
-    ----------
-    outcome
-        None if it has not been computed, or its files are damaged.
-    place
-        Its folder.
-    maps
-        View index -> (H, W) disparity map, pixels per view step; empty unless it is ok.
-    """
-
-    cell: Cell
-    outcome: Outcome | None
-    place: Path
-    maps: Mapping[int, NDArray[np.float32]] = {}
-
-    @cached_property
-    def volume(self) -> StoredVolume | None:
-        """The stored volume, read only when it is asked for: it is large. None if there is none, or it is damaged."""
-        return _volume(self.place) if self.outcome is not None and self.outcome.has_volume else None
-
-
-class FolderLost(UserError):
-    """The run folder can no longer be written or read: the disk is full, or the network is gone."""
-
-    @classmethod
-    def of(cls, folder: Path, error: OSError) -> "FolderLost":
-        why = error.strerror or str(error)
-        return cls(f"run folder {str(folder)!r} cannot be used: {why}. What is finished stays; mend this and go on")
-
-
-def maps_digest(maps: Mapping[int, NDArray[np.float32]]) -> str:
-    """Sixteen hexadecimal digits of SHA-256 over disparity maps: views, sizes and every bit of the values."""
-    digest = sha256()
-    for view, values in sorted(maps.items()):
-        digest.update(f"{view} {values.shape};".encode() + np.ascontiguousarray(values).tobytes())
-    return digest.hexdigest()[:16]
-
-
-def read_maps(path: Path) -> dict[int, NDArray[np.float32]]:
-    """View index -> (H, W) disparity map in a file, pixels per view step.
-
-    Raises
-    ------
-    ValueError, OSError
-        If the file is missing or holds something else.
-    """
-    with path.open("rb") as file:
-        try:
-            with zipfile.ZipFile(file) as archive:
-                # a small archive may unpack to more than the memory holds
-                if sum(info.file_size for info in archive.infolist()) > _MAP_BYTES:
-                    raise ValueError(f"{path} unpacks to more than {_MAP_BYTES} bytes")
-            file.seek(0)
-            with np.load(file, allow_pickle=False) as arrays:
-                maps = {int(name.removeprefix("view_")): arrays[name] for name in arrays.files}
-        except (zipfile.BadZipFile, EOFError, TypeError, KeyError) as error:
-            raise ValueError(f"{path} holds no disparity maps") from error
-    if not maps or any(values.ndim != 2 or values.dtype != np.float32 for values in maps.values()):
-        raise ValueError(f"{path} holds no disparity maps")
-    return maps
+_json = make_converter(detailed_validation=False)  # the first fault is enough: a plan may have a hundred thousand
 
 
 def _to_disk(folder: Path) -> None:
     """Wait until a folder's files are on the disk. If they cannot be written, the error comes here and not later."""
     for path in [*folder.iterdir(), folder]:
-        number = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(number)
-        finally:
-            os.close(number)
+        settle(path)
 
 
 _TABLE_DRAFT = re.compile(
-    r"\.(plan|scores|work|results|cells|sweeps|ablation|reliability|report)\.(json|csv|tex|html)\.\w+"
+    r"\.(plan|scores|work|results|cells|changes|sweeps|ablation|reliability|sparsification|report)\.(json|csv|tex|html)\.\w+"
 )
 
 
@@ -150,13 +85,19 @@ class Store:
             with locked(folder):
                 store.check(plan)  # once more: before the lock, another process may have begun a run here
                 store.write_plan(plan, command)
+                if not settle(folder / "cells"):
+                    remark_once(
+                        f"the file system of {str(folder)!r} does not tell when files are safe on the disk: "
+                        "after a power cut, finished cells may be lost"
+                    )
         except OSError as error:
-            raise UserError(f"output folder {str(folder)!r} cannot be used: {error.strerror}") from error
+            raise UserError(f"output folder {str(folder)!r} cannot be used: {cause(error)}") from error
         return store
 
     def check(self, plan: Plan) -> None:
         """Raise what `open` raises for a folder that cannot hold a plan; nothing is written."""
         folder = self.folder
+        refuse_hidden("output folder", str(folder))
         if folder.exists() and not folder.is_dir():
             raise UserError(f"output {str(folder)!r} is a file: name a folder that is new or holds this run")
         if (folder / "plan.json").exists():
@@ -179,16 +120,20 @@ class Store:
         known = self._read(path).get("command", "") if path.exists() else ""
         facts = {"request": plan.request, "command": command or known, **_json.unstructure(plan)}
         text = json.dumps(facts, indent=1)
-        if not path.exists() or path.read_text(encoding="utf-8") != text:
+        if len(text) > _MOST_PLAN:
+            raise UserError(f"a plan of {len(plan.cells)} cells is too large: ask for less in one run")
+        if not path.exists() or read_plain(path, most=_MOST_PLAN) != text.encode():
             write_text(path, text)
         (self.folder / "cells").mkdir(exist_ok=True)
 
     def _read(self, path: Path) -> dict[str, Any]:
         try:
-            found = json.loads(path.read_text(encoding="utf-8"))
+            found = read_json(path, most=_MOST_PLAN)
         except OSError as error:
-            raise UserError(f"{path} cannot be read: {error.strerror}; give a run folder") from error
-        except (ValueError, RecursionError) as error:
+            raise UserError(f"{path} cannot be read: {cause(error)}; give a run folder") from error
+        except NotPlain as error:
+            raise UserError(f"{path} cannot be read: {error}; give a run folder") from error
+        except ValueError as error:
             raise UserError(f"{path} is damaged: not JSON") from error
         if not isinstance(found, dict):
             raise UserError(f"{path} is damaged: not a JSON object")
@@ -200,7 +145,7 @@ class Store:
 
     def command(self) -> str:
         """The line that asked for the run, if it is known."""
-        return str(self._read(self.folder / "plan.json").get("command", ""))
+        return printable(str(self._read(self.folder / "plan.json").get("command", "")))
 
     def plan(self) -> Plan:
         """The plan of the run in this folder."""
@@ -212,13 +157,31 @@ class Store:
             raise UserError(f"{self.folder / 'plan.json'} is damaged: it is not a plan") from error
         if not all(KEY.fullmatch(c.key) for c in plan.cells):
             raise UserError(f"{self.folder / 'plan.json'} is damaged: a cell's key is not 16 hexadecimal digits")
-        if not all(str(c).isprintable() for c in plan.cells):
-            raise UserError(f"{self.folder / 'plan.json'} is damaged: a cell's name cannot be printed")
+        names = [name for c in plan.cells for name in (str(c), c.method.algorithm, c.method.file, *c.method.params)]
+        if any(map(hidden_in, (*names, *plan.plugin_files, *plan.spellings, *plan.spellings.values()))):
+            raise UserError(f"{self.folder / 'plan.json'} is damaged: a name in it cannot be printed")
+        parts = [
+            p for c in plan.cells for m in (c.method,) for p in (m.algorithm, m.changed, m.file, *m.names, c.scene)
+        ]
+        if max(map(len, parts), default=0) > LONGEST_NAME:
+            raise UserError(f"{self.folder / 'plan.json'} is damaged: a name in it is too long")
+        if not all(0 <= c.seed <= LARGEST_SEED and 0 <= c.repeat <= _MOST_REPEATS for c in plan.cells):
+            raise UserError(f"{self.folder / 'plan.json'} is damaged: a cell's seed or repeat cannot be right")
         return plan
 
     def cell(self, cell: Cell) -> Path:
         """Where a cell's files lie once it is done."""
         return self.folder / "cells" / cell.key
+
+    def facts(self, cell: Cell) -> Any:
+        """What ``cell.json`` holds, unchecked.
+
+        Raises
+        ------
+        ValueError, OSError
+            If it is missing, or no JSON.
+        """
+        return read_json(self.cell(cell) / "cell.json", most=MOST_FACTS)
 
     def outcome(self, cell: Cell) -> Outcome | None:
         """A cell's outcome, without a look at its maps. None if it is not computed, or ``cell.json`` is damaged.
@@ -229,20 +192,21 @@ class Store:
             If the folder cannot be read, so that its content is unknown.
         """
         try:
-            facts = json.loads((self.cell(cell) / "cell.json").read_text(encoding="utf-8"))
-            outcome = _json.structure(facts["outcome"], Outcome)
-            numbers = (outcome.seconds, outcome.warmup_seconds, outcome.peak_mb)
-            if not all(isfinite(number) for number in numbers if number is not None):
-                return None
+            outcome = _json.structure(self.facts(cell)["outcome"], Outcome)
+            return None if outcome.implausible else outcome
         except Exception as error:  # half a cell is no cell: it is computed anew
             self._check_readable(error)
             return None
-        return outcome
 
-    def read(self, cell: Cell) -> "Solved":
-        """Read a cell with its maps, and check the maps against their digest.
+    def read(self, cell: Cell, scene: Scene | None = None) -> Solved:
+        """Read a cell with its maps and its confidence, and check both against their digests.
 
         The outcome is None if the cell is not computed, or its files are damaged.
+
+        Parameters
+        ----------
+        scene
+            What was solved, if it is known: maps and volumes of another size are not unpacked.
 
         Raises
         ------
@@ -253,52 +217,59 @@ class Store:
         if outcome is None or outcome.status != "ok":
             return Solved(cell, outcome, place)
         try:
-            maps = self.disparity(cell)
+            maps = self.disparity(cell, scene)
         except Exception as error:  # half a cell is no cell: it is computed anew
             self._check_readable(error)
             return Solved(cell, None, place)
         if outcome.maps and maps_digest(maps) != outcome.maps:
-            return Solved(cell, None, place)
-        return Solved(cell, outcome, place, maps)
+            return Solved(cell, None, place, scene=scene)
+        solved = Solved(cell, outcome, place, maps, scene)
+        if outcome.confidence and not solved.confidence:
+            return Solved(cell, None, place, scene=scene)
+        return solved
 
     def _check_readable(self, error: Exception) -> None:
         """Raise FolderLost unless the error says that a file is missing or damaged."""
         if isinstance(error, OSError) and error.errno is not None and error.errno not in _ABSENT:
-            raise FolderLost.of(self.folder, error) from error
+            raise Stopped.of(self.folder, error) from error
 
     def fingerprint(self, cell: Cell) -> str:
         """SHA-256 of a stored cell's facts, which hold the digest of its maps; empty if there is none."""
         try:
-            return sha256((self.cell(cell) / "cell.json").read_bytes()).hexdigest()
-        except OSError:
+            return digest_plain(self.cell(cell) / "cell.json", most=MOST_FACTS)
+        except (OSError, NotPlain):
             return ""
 
     def stale(self, plan: Plan) -> list[Cell]:
-        """The stored cells that do not belong to the plan: those of other code, other pixels, other repeats."""
+        """The stored cells that do not belong to the plan: those of other code, other pixels, other repeats.
+
+        Of a run that grows, cells of scenes that it may still come to are none of these.
+        """
         current = {cell.key for cell in plan.cells}
+        known = {(str(cell.method), cell.method.code) for cell in plan.cells}
         found = []
         for path in sorted((self.folder / "cells").glob("*/cell.json")):
             if path.parent.name in current or not KEY.fullmatch(path.parent.name):
                 continue
             try:
-                cell = _json.structure(json.loads(path.read_text(encoding="utf-8"))["cell"], Cell)
+                cell = _json.structure(read_json(path, most=MOST_FACTS)["cell"], Cell)
             except Exception:  # whatever a damaged one raises  # noqa: S112
                 continue
-            if cell.key == path.parent.name:
+            is_to_come = cell.scene in plan.among and (str(cell.method), cell.method.code) in known
+            if cell.key == path.parent.name and not is_to_come:
                 found.append(cell)
         return found
 
     @contextmanager
     def building(self, cell: Cell) -> Iterator[Path]:
         """A draft folder for a cell. It becomes the cell's folder when the block ends; if the block fails, it goes."""
-        draft = Path(tempfile.mkdtemp(prefix=f".{cell.key}.", dir=self.folder / "cells"))
+        draft = draft_folder(self.folder / "cells", cell.key)
         try:
             yield draft
             _to_disk(draft)
-            draft.chmod(0o755)  # mkdtemp made it for this user alone, but others may read a run
             self._place(draft, cell)
         finally:
-            shutil.rmtree(draft, ignore_errors=True)
+            remove(draft)
 
     def _place(self, draft: Path, cell: Cell) -> None:
         for attempt in range(3):
@@ -307,17 +278,17 @@ class Store:
             try:
                 draft.replace(self.cell(cell))
             except OSError as error:  # somebody else's came in between
-                if error.errno != ENOTEMPTY or attempt == 2:
+                if error.errno not in (ENOTEMPTY, EEXIST) or attempt == 2:
                     raise
             else:
                 return
 
     def remove(self, cell: Cell) -> None:
         """Remove a cell in one step: its folder is moved aside before its files are deleted."""
-        aside = Path(tempfile.mkdtemp(prefix=".removed.", dir=self.folder / "cells"))
+        aside = draft_folder(self.folder / "cells", "removed")
         with suppress(FileNotFoundError):
             self.cell(cell).replace(aside / cell.key)
-        shutil.rmtree(aside, ignore_errors=True)
+        remove(aside)
 
     def try_out(self) -> None:
         """Write a mebibyte and raise FolderLost if that fails: better before a long solve than after it."""
@@ -325,9 +296,9 @@ class Store:
             with tempfile.TemporaryFile(dir=self.folder / "cells") as file:
                 file.write(os.urandom(1 << 20))
                 file.flush()
-                os.fsync(file.fileno())
+                settle(file.fileno())
         except OSError as error:
-            raise FolderLost.of(self.folder, error) from error
+            raise Stopped.of(self.folder, error) from error
 
     def recording(self, part: str | None = None) -> Path:
         """The recording of the one cell whose name or key contains `part`.
@@ -353,49 +324,22 @@ class Store:
         self.check_place()
         for draft in (self.folder / "cells").glob(".*"):
             if _DRAFT.fullmatch(draft.name):
-                shutil.rmtree(draft, ignore_errors=True)
+                remove(draft)
         for draft in self.folder.glob(".*.*.*"):
             if _TABLE_DRAFT.fullmatch(draft.name):
                 with suppress(OSError):
                     draft.unlink()
 
-    def disparity(self, cell: Cell) -> dict[int, NDArray[np.float32]]:
-        """View index -> (H, W) stored disparity map, pixels per view step.
+    def disparity(self, cell: Cell, scene: Scene | None = None) -> dict[int, NDArray[np.float32]]:
+        """View index -> (H, W) stored disparity map, pixels per view step; those of `scene`, if it is given.
 
         Raises
         ------
         ValueError, OSError
             If the file is missing or holds something else.
         """
-        return read_maps(self.cell(cell) / "disparity.npz")
+        return read_maps(self.cell(cell) / "disparity.npz", None if scene is None else (scene.height, scene.width))
 
-    def volume(self, cell: Cell) -> StoredVolume | None:
-        """The stored volume; None if there is none, or it is damaged."""
-        return _volume(self.cell(cell))
-
-
-def _volume(place: Path) -> StoredVolume | None:
-    try:
-        return StoredVolume.read(place / "volume.npz")
-    except (ValueError, OSError):
-        return None
-
-
-def write_cell(
-    draft: Path,
-    cell: Cell,
-    outcome: Outcome,
-    disparity: Mapping[int, NDArray[np.float32]] | None = None,
-    volume: StoredVolume | None = None,
-) -> None:
-    """Fill a cell's draft folder with its facts and, if it has them, its maps and its volume."""
-    if volume is not None:
-        volume.write(draft / "volume.npz")
-    if disparity is not None:
-        arrays: dict[str, Any] = {f"view_{view}": values for view, values in disparity.items()}
-        np.savez_compressed(draft / "disparity.npz", **arrays)
-    maps = maps_digest(disparity) if disparity else outcome.maps
-    outcome = evolve(outcome, maps=maps, ran_on={**provenance.ran_on(), **outcome.ran_on})
-    facts = {"cell": _json.unstructure(cell), "outcome": _json.unstructure(outcome)}
-    text = json.dumps(facts, indent=1, allow_nan=False)
-    (draft / "cell.json").write_text(text, encoding="utf-8")
+    def volume(self, cell: Cell, scene: Scene | None = None) -> StoredVolume | None:
+        """The stored volume; None if there is none, it is damaged, or it is none of `scene`, if that is given."""
+        return read_volume(self.cell(cell), scene)

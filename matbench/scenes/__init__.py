@@ -3,6 +3,10 @@
 Imports the basic modules, `files`, `measures` and `plans`.
 """
 
-from matbench._moved import scene_name as __getattr__
+from functools import partial
+from typing import TYPE_CHECKING
 
-__all__ = ["__getattr__"]
+from matbench._moved import moved_name
+
+if not TYPE_CHECKING:  # for mypy, any name would be here
+    __getattr__ = partial(moved_name, __name__)

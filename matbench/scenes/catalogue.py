@@ -11,21 +11,25 @@ from pathlib import Path
 
 from attrs import evolve, frozen
 
-from matbench.errors import UserError, failure, unknown
-from matbench.files.own_folders import data_folder
+from matbench.errors import UserError, failure, refuse_hidden, unknown
+from matbench.files.own_folders import data_folder, expanded
 from matbench.plans import plugins
 from matbench.regions import regions
 from matbench.scene import Scene
 from matbench.scenes import views_only
 from matbench.scenes.dataset import Dataset, Listing, loaded
-from matbench.spec import Spec, expand, label, parse
+from matbench.spec import Spec, count, expand, label, parse
 
 DATA_VARIABLE = "MATBENCH_DATA"
 PAPER_SCENES = ("middlebury2001/tsukuba", "middlebury2006/Rocks1", "middlebury2003/teddy")
-SYNTHETIC_SCENES = ("synthetic/box", "synthetic/curved", "synthetic/weak")
-GROUPS = {"paper": PAPER_SCENES}
-"""Words that stand for several scenes in a selector, as a pattern does."""
+DEFAULT_SET = "worlds/quick[size=120x90]"
+"""The computed scenes that are taken where none are named: so small that compiling takes longer than solving."""
+GROWING_SET = "worlds/large[size=120x90]"
+"""The scenes that a run adds, in order, where it grows until it decides and none are named."""
+GROUPS: Mapping[str, Sequence[str]] = {"paper": PAPER_SCENES}
+"""Words that stand for several scenes in a selector, as a pattern does. Datasets have further ones (`sets`)."""
 
+_SHOWN = 200  # characters of a name in a message
 _NO_TRUTH = "no ground truth"
 
 
@@ -47,7 +51,8 @@ def data_root(data: str | Path | None = None) -> Path | None:
             own = data_folder()
             return own.resolve() if own.is_dir() else None
         return None
-    root = Path(named).expanduser()
+    refuse_hidden("data folder", str(named))
+    root = expanded(named)
     if not root.is_dir():
         by = "--data" if data else DATA_VARIABLE
         raise UserError(f"data folder {str(root)!r} ({by}) does not exist: name the folder that holds middlebury/")
@@ -67,6 +72,13 @@ def own_folder(name: str) -> str | None:
         return None
     path = os.path.normpath(os.path.expanduser(name))  # noqa: PTH111 (as text: what is typed stays recognizable)
     return path if path.startswith((os.sep, "..")) else os.path.join(".", path)  # noqa: PTH118
+
+
+def _each(spec: Spec) -> list[Spec]:
+    """The scenes of a folder that a pattern among its options means; as a rule, the one."""
+    folder = own_folder(spec.name) if any("*" in value for value in spec.options.values()) else None
+    expand = None if folder is None else getattr(_dataset(OWN), "expand", None)
+    return [spec] if expand is None else [Spec(spec.name, options) for options in expand(folder, spec.options)]
 
 
 def _folders(pattern: str) -> list[str]:
@@ -112,9 +124,26 @@ class Selection:
     left_out: Mapping[str, Sequence[str]] = {}
 
 
+def sets() -> dict[str, Sequence[str]]:
+    """Name -> scenes in order, for every set: ``paper``, and what datasets offer, such as ``worlds/quick``."""
+    found: dict[str, Sequence[str]] = {}
+    for plugin in plugins.datasets().values():
+        with suppress(Exception):  # a plug-in's own failure harms no other; `listings` says what is wrong with it
+            offered = getattr(loaded(plugin), "sets", None)
+            found |= offered() if offered is not None else {}
+    return {**found, **GROUPS}  # a dataset cannot take a name from them
+
+
+def _is_set(name: str) -> bool:
+    if name in GROUPS:
+        return True
+    prefix, slash, _ = name.partition("/")
+    return slash != "" and prefix not in ("", ".", "..", "~") and prefix not in plugins.datasets() and name in sets()
+
+
 def is_pattern(name: str) -> bool:
-    """Does a name stand for all scenes that it matches, or for a group such as ``paper``?"""
-    return name in GROUPS or re.search(r"[*?]", name) is not None
+    """Does a name stand for all scenes that it matches, or for a set such as ``paper``?"""
+    return re.search(r"[*?]", name) is not None or _is_set(name)
 
 
 def group(name: str, known: Iterable[str]) -> list[str]:
@@ -145,14 +174,17 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None, needs
     known: dict[str, Listing | UserError] | None = None
     for spec in expand(selectors):
         if not is_pattern(spec.name):
-            names[str(spec)] = None
+            names |= {str(one): None for one in _each(spec)}
+            continue
+        if spec.name not in GROUPS and _is_set(spec.name):
+            names |= dict.fromkeys(_members(spec))
             continue
         known = known if known is not None else listings(data)
         hits = group(spec.name, known)
         if not hits and (folders := _folders(spec.name)):
             names |= {str(Spec(folder, spec.options)): None for folder in folders}
             continue
-        offered = {name: found for name in hits if isinstance(found := known[name], Listing)}
+        offered = {name: one for name in hits if isinstance(one := known[name], Listing) and not one.endless}
         present = {name: found for name, found in offered.items() if found.present or found.complete}
         why = {name: _unfit(found, spec.options, needs_truth) for name, found in present.items()}
         fit = [name for name, reason in why.items() if not reason]
@@ -163,6 +195,11 @@ def select(selectors: str | Iterable[str], data: str | Path | None = None, needs
                 left_out[reason].append(name)
         names |= {str(Spec(name, spec.options)): None for name in fit}
     return Selection(tuple(names), left_out)
+
+
+def _members(spec: Spec) -> list[str]:
+    """The scenes of a dataset's set; the options after its name replace those of the scenes."""
+    return [str(Spec(one.name, {**one.options, **spec.options})) for one in expand(sets()[spec.name])]
 
 
 def _unfit(listing: Listing, options: Mapping[str, str], needs_truth: bool) -> str:
@@ -222,12 +259,14 @@ def load_scene(
             return load_scene(name, data)
     if views_only.wanted():
         return views_only.from_another_process(name, data, plugins.used())
-    specs = parse(name)
-    if len(specs) != 1:
-        raise UserError(f"{name!r} names {len(specs)} scenes: give one value for each option")
-    options = dict(specs[0].options)
+    if (named := count(name)) != 1:
+        raise UserError(f"{name[:_SHOWN]!r} names {named} scenes: give one value for each option")
+    (asked,) = parse(name)
+    if _is_set(asked.name):
+        raise UserError(f"{asked.name} is a set of {len(sets()[asked.name])} scenes: name one of them")
+    options = dict(asked.options)
     end = options.pop("predict", None)
-    scene = _load(specs[0].name, options, data)
+    scene = _load(asked.name, options, data)
     if end is None:
         return scene
     from matbench.measures.prediction import hold_out
@@ -252,14 +291,19 @@ def _load(name: str, options: Mapping[str, str], data: str | Path | None) -> Sce
         )
     if scene.regions or scene.ref not in scene.truth:
         return scene
-    partner = scene.pair_steps if scene.ref + scene.pair_steps < scene.n else -scene.pair_steps
+    partner = scene.pair_steps if scene.steps(scene.n - 1) >= scene.pair_steps else -scene.pair_steps
     return evolve(scene, regions=regions(scene.views[scene.ref], scene.truth[scene.ref], partner))
 
 
+def growing_scenes(data: str | Path | None = None) -> list[str]:
+    """The scenes of a run that grows until it decides, in order, where none are named."""
+    return list(select(GROWING_SET, data).names)
+
+
 def default_scenes(data: str | Path | None = None) -> tuple[list[str], list[str]]:
-    """The default scenes, three synthetic ones and the paper's three: those present, and those missing."""
+    """The default scenes, those of `DEFAULT_SET` and the paper's three: those present, and those missing."""
     known = listings(data)
     present = {name for name, listing in known.items() if isinstance(listing, Listing) and listing.present}
-    synthetic = [name for name in SYNTHETIC_SCENES if name in present]
+    computed = list(select(DEFAULT_SET, data).names)
     paper = [name for name in PAPER_SCENES if name in present]
-    return synthetic + paper, [name for name in PAPER_SCENES if name not in present]
+    return computed + paper, [name for name in PAPER_SCENES if name not in present]

@@ -30,6 +30,8 @@ class Listing:
         The sizes in which it can be loaded now, where a dataset tells them apart.
     truth
         Does it have ground truth, so that methods can be scored on it?
+    endless
+        Is it one of any number of scenes, told apart by their option ``seed``? No pattern matches it.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Listing:
     present: bool
     complete: Collection[str] | None = None
     truth: bool = True
+    endless: bool = False
 
 
 @frozen
@@ -104,6 +107,10 @@ class Dataset(Protocol):
     """A family of scenes under one prefix: the name of its entry point, such as ``middlebury2003``.
 
     In a file of one's own, a class that takes no arguments; the prefix is its name in snake case.
+
+    One with sets of scenes also has ``sets() -> Mapping[str, Sequence[str]]``: name of the set, such as
+    ``worlds/quick``, which begins with no dataset's prefix -> its scenes in order, prefix included. Their options may
+    stand in brackets after them. A set can be named wherever a scene can.
 
     One whose scenes can be downloaded also has ``downloads() -> Mapping[str, Mapping[str, Download]]``:
     scene without prefix -> size, the default first -> its files; `matbench fetch` then brings them.

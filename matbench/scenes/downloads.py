@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from matbench.errors import UserError, unknown
-from matbench.files.own_folders import data_folder
+from matbench.files.own_folders import data_folder, expanded
 from matbench.plans import plugins
 from matbench.scenes.catalogue import DATA_VARIABLE, group, is_pattern
 from matbench.scenes.dataset import Download, loaded
@@ -23,7 +23,7 @@ def fetch_root(data: str | Path | None = None) -> Path:
     UserError
         If it is there but no folder, or the person has no folder of their own.
     """
-    root = Path(data or os.environ.get(DATA_VARIABLE) or data_folder()).expanduser()
+    root = expanded(data or os.environ.get(DATA_VARIABLE) or data_folder())
     if root.exists() and not root.is_dir():
         raise UserError(f"data folder {str(root)!r} is a file: name a folder, or one to be made")
     return root.resolve()

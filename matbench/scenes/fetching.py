@@ -8,18 +8,22 @@ import errno
 import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cached_property
 from hashlib import file_digest
+from math import inf
 from pathlib import Path, PurePosixPath
 from typing import Literal
 from urllib.parse import quote, urlsplit
 
 from attrs import define, field, frozen
 
-from matbench.errors import UserError
+from matbench.errors import UserError, cause
+from matbench.files.locking import Busy, held
+from matbench.files.remarks import remark_once
 from matbench.files.transfer import PATIENCE, NoAnswer, Patience, TransferError, download
 from matbench.files.unzip import ArchiveError, members, opened, unpack
+from matbench.files.writing import move, settle
 from matbench.scenes.dataset import Download, Remote
 
 Event = Literal["scene", "waiting", "bytes"]
@@ -74,10 +78,19 @@ def site_of(mirror: str) -> str:
     UserError
         If it is not one of http or https.
     """
-    parts = urlsplit(mirror)
-    if parts.scheme not in ("http", "https") or not parts.netloc or parts.query or parts.fragment:
+    if not _is_site(mirror):
         raise UserError(f"mirror {mirror!r} is no address: write http://HOST/PATH/ or https://HOST/PATH/")
     return mirror.rstrip("/") + "/"
+
+
+def _is_site(mirror: str) -> bool:
+    try:
+        parts = urlsplit(mirror)
+        parts.hostname and parts.hostname.encode("idna")
+        parts.port  # noqa: B018
+    except ValueError:  # brackets without an end, a port that is no number, a part of a name that is too long
+        return False
+    return parts.scheme in ("http", "https") and bool(parts.hostname) and not (parts.query or parts.fragment)
 
 
 def fetch(
@@ -221,20 +234,18 @@ class _Job:
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
-        from filelock import FileLock, Timeout
-
         locks = self.root / ".fetch"
         locks.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(locks / f"{quote(str(self.download.folder), safe='')}.lock")
-        try:
-            lock.acquire(timeout=0)
-        except Timeout:
-            self.line.listen("waiting", self.download.name, 0, None)
-            lock.acquire()
-        try:
+        lock = locks / f"{quote(str(self.download.folder), safe='')}.lock"
+        with ExitStack() as stack:
+            try:
+                taken = stack.enter_context(held(lock))
+            except Busy:
+                self.line.listen("waiting", self.download.name, 0, None)
+                taken = stack.enter_context(held(lock, patience=inf))
+            if not taken:
+                remark_once(f"nothing can be locked under {self.root}: start no second fetch there meanwhile")
             yield
-        finally:
-            lock.release()
 
     def _tidy(self) -> None:
         """Leave only parts that can be gone on with while files are missing, and no empty folder."""
@@ -327,8 +338,8 @@ class _Job:
         if name not in file.names:
             name = PurePosixPath(file.name).stem + PurePosixPath(name).suffix
         with path.open("rb+") as written:
-            os.fsync(written.fileno())
-        path.replace(self.folder / name)
+            settle(written.fileno())
+        move(path, self.folder / name)
         self.came[file.name] = name
 
 
@@ -350,4 +361,4 @@ def _in_words(error: OSError, root: Path) -> str:
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         free = shutil.disk_usage(root).free if root.exists() else 0
         return f"there is no space left under {root} ({free / 1e6:.1f} MB free): make some, then fetch again"
-    return f"{error.filename or root} cannot be written: {error.strerror}"
+    return f"{error.filename or root} cannot be used: {cause(error)}"

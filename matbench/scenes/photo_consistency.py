@@ -62,8 +62,8 @@ def warping_errors(
     reference = scene.views[scene.ref].astype(np.float32)
     found = {}
     for view in range(scene.n):
-        steps = view - scene.ref
-        if steps == 0:
+        steps = scene.steps(view)
+        if view == scene.ref:
             continue
         moved = [truth + np.float32(shift / scene.pair_steps) for shift in shifts]
         pictures = [warped(scene.views[view], disparity, steps) for disparity in moved]
@@ -92,7 +92,7 @@ def left_over(scene: Scene) -> NDArray[np.float32]:
     total, count = np.zeros(truth.shape), np.zeros(truth.shape)
     for view in range(scene.n):
         if view != scene.ref:
-            difference = np.abs(warped(scene.views[view], truth, view - scene.ref) - reference).mean(axis=2)
+            difference = np.abs(warped(scene.views[view], truth, scene.steps(view)) - reference).mean(axis=2)
             seen = _seen(scene, truth, view) & np.isfinite(difference)
             total[seen] += difference[seen]
             count[seen] += 1
@@ -102,7 +102,7 @@ def left_over(scene: Scene) -> NDArray[np.float32]:
 def _seen(scene: Scene, truth: NDArray[np.float32], view: int) -> NDArray[np.bool_]:
     """(H, W): does another view see the reference view's points? Exact where that is known; no black border."""
     exact = scene.visible.get(scene.ref) if truth is scene.truth[scene.ref] else None
-    seen = points_seen(truth, view - scene.ref) if exact is None else exact[view].copy()
+    seen = points_seen(truth, scene.steps(view)) if exact is None else exact[view].copy()
     first, last = picture_columns(scene.views[scene.ref])
     seen[:, :first] = seen[:, last + 1 :] = False
     return seen

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from matbench.measures.prediction import instead_of_truth
 from matbench.measures.warping import picture_columns
+from matbench.regions import PAIR_REGIONS
 from matbench.scene import Scene
 from matbench.scenes import alignment
 from matbench.scenes.alignment import Matches
@@ -20,6 +21,7 @@ Verdict = Literal["good", "note", "problem", "unknown"]
 NOTED_ROWS, WRONG_ROWS = 0.5, 1.0  # px of vertical misalignment
 NOTED_STEP, WRONG_STEP = 0.12, 0.3  # of a view step, from the view's place
 IN_RANGE = 0.9  # share of matched features that the range must hold
+FAR_FROM_0 = 1.0  # px of the pair: where all disparities but 0 are larger, 0 is suspicious
 LARGEST_BEYOND = 0.02  # share of the truth that may lie outside the range; all of it is told
 LEAST_SEEN = 0.1  # share of the truth's points that the other views see, together
 NOTED_SHIFT = 0.5  # px of the pair, from where the truth explains the views best
@@ -60,7 +62,11 @@ def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Observat
     called = list(names or scene.labels)
     matches = alignment.match(scene.views, scene.ref)
     places = alignment.places(matches, scene.n, scene.ref)
-    steps = (np.arange(scene.n) - scene.ref).astype(np.float64) if places is None else places
+    expected = np.array([scene.steps(view) for view in range(scene.n)])
+    if places is not None:  # only ratios are measured: in view steps, the known views are as far apart as they should
+        seen = expected[np.isfinite(places)]
+        places = places * (seen[-1] - seen[0]) / (len(seen) - 1)
+    steps = expected if places is None else places
     found = alignment.disparities(matches, steps)
     if places is not None and not _follow(places) and _inside(scene, -found) > _inside(scene, found) + _CLEAR_SHARE:
         places, found = -places, -found  # no order at all has no direction either: that of the range
@@ -71,6 +77,12 @@ def check(scene: Scene, names: Sequence[str] | None = None) -> Iterator[Observat
     yield from _borders(scene, called)
     if not scene.truth:
         yield Observation("truth", "note", f"there is none: a comparison needs {instead_of_truth(scene)}")
+    if scene.sparse:
+        known = np.count_nonzero(np.isfinite(scene.truth[scene.ref])) / (scene.height * scene.width)
+        missing = ", ".join(name for name in PAIR_REGIONS if name not in scene.regions)
+        yield Observation(
+            "regions", "note", f"truth is known at scattered pixels, {100 * known:.0f} %, so {missing} are unknown"
+        )
     for view in sorted(scene.truth):
         yield from _truth(evolve(scene, ref=view, regions={}), called[view])
 
@@ -123,13 +135,19 @@ def _order(scene: Scene, names: Sequence[str], places: NDArray[np.float64] | Non
         return Observation(
             "order", "problem", f"the views do not follow one another: list {_list([names[v] for v in order])}"
         )
-    away = np.abs(places - (np.arange(scene.n) - scene.ref))
+    away = np.abs(places - np.array([scene.steps(view) for view in range(scene.n)]))
     worst = int(np.nanargmax(away))
-    text = f"view {names[worst]} was taken {places[worst] - places[scene.ref]:.2f} steps from {names[scene.ref]}"
-    if away[worst] > WRONG_STEP:
-        return Observation("order", "problem", f"views are not evenly spaced: {text}, not {worst - scene.ref}")
+    text = (
+        f"view {names[worst]} was taken {places[worst] - places[scene.ref]:.2f} steps from {names[scene.ref]}, "
+        f"not {scene.steps(worst):g}"
+    )
+    spaced = "evenly spaced" if scene.is_even else f"spaced as positions says ({scene.where})"
     if away[worst] > NOTED_STEP:
-        return Observation("order", "note", f"views are not quite evenly spaced: {text}, not {worst - scene.ref}")
+        found = ", ".join(f"{place - places[0]:.2f}" for place in places)
+        hint = f"; where they were meant to, write positions = [{found}]" if np.isfinite(places).all() else ""
+        if away[worst] > WRONG_STEP:
+            return Observation("order", "problem", f"views are not {spaced}: {text}{hint}")
+        return Observation("order", "note", f"views are not quite {spaced}: {text}{hint}")
     even = f"from one side to the other, within {away[worst]:.2f} of a step"
     if len(known) < scene.n:
         left = _list([names[view] for view in range(scene.n) if view not in known])
@@ -197,6 +215,9 @@ def _borders(scene: Scene, names: Sequence[str]) -> Iterator[Observation]:
 def _truth(scene: Scene, name: str) -> Iterator[Observation]:
     topic = f"{_TRUTH_OF}{name}"
     known = np.count_nonzero(np.isfinite(scene.truth[scene.ref]))
+    if zeros := zeros_beside(scene.truth[scene.ref] * np.float32(scene.pair_steps)):
+        text = f"{zeros} px of the pair: if 0 means unknown, write unknown = 0"
+        yield Observation(topic, "problem" if _is_wrong_at_zeros(scene) else "note", text)
     if beyond := beyond_range(scene):
         share = np.count_nonzero(scene.out_of_range) / known
         yield Observation(topic, "problem" if share > LARGEST_BEYOND else "note", beyond)
@@ -216,6 +237,26 @@ def _truth(scene: Scene, name: str) -> Iterator[Observation]:
         best = _vertex(error)
         text = f"; {best:+.1f} px would explain them best" if abs(best) > NOTED_SHIFT else ""
         yield Observation(topic, "note" if text else "good", said + text)
+
+
+def zeros_beside(truth: NDArray[np.float32]) -> str:
+    """Does 0 stand far from all other disparities, as where it means unknown? In words; empty if not."""
+    known = truth[np.isfinite(truth)]
+    zeros, others = int(np.count_nonzero(known == 0)), np.abs(known[known != 0])
+    if not zeros or not others.size or (least := float(others.min())) < FAR_FROM_0:
+        return ""
+    return (
+        f"{zeros} of {known.size} numbers are 0 ({100 * zeros / known.size:.1f} %), and no other is nearer to it "
+        f"than {least:.3g}"
+    )
+
+
+def _is_wrong_at_zeros(scene: Scene) -> bool:
+    """Do the views differ clearly more where truth is 0 than elsewhere? What is very far would really be at 0."""
+    truth, unknown = scene.truth[scene.ref], np.float32(np.nan)
+    parts = [np.where(mask, truth, unknown) for mask in (truth == 0, truth != 0)]
+    zero, other = (together(warping_errors(scene, part, (0.0,))) for part in parts)
+    return zero is not None and other is not None and CLEARLY * zero.mean[0] > other.mean[0]
 
 
 def beyond_range(scene: Scene) -> str | None:

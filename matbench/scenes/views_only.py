@@ -10,12 +10,14 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from attrs import evolve
 
-from matbench.errors import UserError
+from matbench.errors import UserError, one_line
+from matbench.files.arrays import opened_arrays
+from matbench.files.documents import parse_json
+from matbench.files.temporary import temporary_folder
 from matbench.scene import Range, Scene
 
 VARIABLE = "MATBENCH_VIEWS_ONLY"
@@ -25,7 +27,7 @@ _PATIENCE = 600  # seconds that another process has to read a scene
 
 def without_truth(scene: Scene) -> Scene:
     """The scene as a method may see it: without ground truth, regions, visibility and the held-out view."""
-    return evolve(scene, truth={}, regions={}, visible={}, held_out=None)
+    return evolve(scene, truth={}, regions={}, visible={}, held_out=None, sparse=False)
 
 
 def write_views(scene: Scene, path: Path) -> None:
@@ -36,14 +38,15 @@ def write_views(scene: Scene, path: Path) -> None:
         "ref": scene.ref,
         "disparities": (scene.disparities.least, scene.disparities.largest),
         "pair_steps": scene.pair_steps,
+        "positions": scene.positions,
     }
     np.savez(path, views=scene.views, facts=np.array(json.dumps(facts)))
 
 
 def read_views(path: Path) -> Scene:
     """The scene in a file that `write_views` wrote: without truth, regions and visibilities."""
-    with np.load(path, allow_pickle=False) as arrays:
-        views, facts = arrays["views"], json.loads(str(arrays["facts"]))
+    with opened_arrays(path) as arrays:
+        views, facts = arrays.read("views"), parse_json(str(arrays.read("facts")).encode())
     return Scene(
         name=facts["name"],
         views=views,
@@ -52,6 +55,7 @@ def read_views(path: Path) -> Scene:
         disparities=Range(*facts["disparities"]),
         truth={},
         pair_steps=facts["pair_steps"],
+        positions=tuple(facts["positions"]),
     )
 
 
@@ -74,12 +78,15 @@ def from_another_process(name: str, data: str | Path | None, files: Sequence[Pat
         As `matbench.load_scene`.
     """
     environment = {key: value for key, value in os.environ.items() if key != VARIABLE}
-    with TemporaryDirectory(prefix="matbench-") as folder:
-        path = Path(folder) / "scene.npz"
+    with temporary_folder() as folder:
+        path = folder / "scene.npz"
         line = [sys.executable, "-m", "matbench.scenes.reader", str(path), name, str(data or ""), *map(str, files)]
-        done = subprocess.run(  # noqa: S603 -- this interpreter, and arguments that are no options
-            line, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False
-        )
+        try:
+            done = subprocess.run(  # noqa: S603 -- this interpreter, and arguments that are no options
+                line, env=environment, capture_output=True, text=True, timeout=_PATIENCE, check=False
+            )
+        except (OSError, subprocess.SubprocessError) as error:
+            raise UserError(f"{name} cannot be read: {one_line(error)}") from error
         if done.returncode:
             said = done.stderr.strip().splitlines() or [f"reading {name} ended with status {done.returncode}"]
             raise UserError(said[-1])

@@ -61,6 +61,7 @@ def mirrored(scene: Scene) -> Scene:
         scene,
         views=scene.views[::-1, :, ::-1],
         labels=scene.labels[::-1],
+        positions=tuple(scene.places[-1] - position for position in scene.places[::-1]),
         ref=last - scene.ref,
         truth={last - view: truth[:, ::-1] for view, truth in scene.truth.items()},
         regions={name: mask[:, ::-1] for name, mask in scene.regions.items()},
@@ -78,9 +79,15 @@ def _small(shape: tuple[int, int], disparities: Range, value: int | None = None)
 
 
 @cache
+def truths() -> Mapping[str, Scene]:
+    """The trials whose ground truth is known to whoever judges, by name."""
+    return {name: load_scene(scene) for name, scene in (("easy", EASY), ("either sign", EITHER_SIGN))}
+
+
+@cache
 def trials() -> Mapping[str, Trial]:
     """All trials, by name."""
-    easy, either = (without_truth(load_scene(name)) for name in (EASY, EITHER_SIGN))
+    easy, either = map(without_truth, truths().values())
     scenes = {
         "easy": easy,
         "easy again": easy,

@@ -1,20 +1,14 @@
-"""One solve of `matbench check`, in a process of its own.
+"""One solve of `matbench check`, in a process of its own (`matbench.solving.apart`)."""
 
-Three processes take part. The check starts a watcher from the fork server. The watcher forks the process
-that runs the method, waits for its answer and then kills everything below itself. So a method may hang,
-crash or leave processes behind, and the check goes on.
-"""
-
+import json
 import os
-import tempfile
-import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from hashlib import sha256
-from multiprocessing import Pipe, get_context
-from multiprocessing.connection import Connection, wait
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -22,14 +16,18 @@ from numpy.typing import NDArray
 
 from matbench.algorithm import Context, unsupported
 from matbench.errors import failure
+from matbench.files.plain import NotPlain, open_plain
+from matbench.files.temporary import temporary_folder
 from matbench.measures.volumes import StoredVolume
-from matbench.plans import limits, plugins
-from matbench.plans.plan import Method
-from matbench.solving import memory, processes
+from matbench.plans import limits
+from matbench.plans.plan import Method, plugin_of
+from matbench.solving import memory
+from matbench.solving.apart import NoAnswer, call_apart
 from matbench.solving.check_scenes import Trial
-from matbench.solving.worker import checked
+from matbench.solving.returned import checked_confidence, checked_maps
 
-_TICK = 0.05  # seconds between two looks at a process
+_FACTS = {"digest": str, "infinite": int, "touched": bool, "reason": str, "error": str}
+_LAST = 2000  # bytes of what a method prints
 
 
 @frozen(eq=False)
@@ -41,7 +39,7 @@ class Answer:
     maps
         View -> (H, W) float32, as the harness stores them; empty without an answer.
     digest
-        SHA-256 of the estimate: maps, volume, history and work.
+        SHA-256 of the estimate: maps, confidence, volume, history and work.
     infinite
         How many pixels of the maps were infinite; in `maps` these are NaN.
     touched
@@ -83,13 +81,13 @@ def solve_here(method: Method, files: Sequence[Path], trial: Trial, log: Path) -
     """Solve one trial in this process; an exception of the method becomes the answer's `error`."""
     with _printing_to(log):
         try:
-            instance = plugins.algorithm(method.algorithm, files).make(method.params)
+            instance = plugin_of(method, files).make(method.params)
             scene, before = trial.scene, trial.views.copy()
             if reason := unsupported(instance, scene):
                 return Answer(reason=reason)
             estimate = instance.solve(scene, Context(threads=trial.threads))
             touched = not np.array_equal(scene.views, before)
-            maps = checked(estimate, scene)
+            maps = checked_maps(estimate, scene)
             infinite = sum(int(np.isinf(values).sum()) for values in estimate.disparity.values())
             volume = b""
             if estimate.volume is not None:
@@ -97,60 +95,48 @@ def solve_here(method: Method, files: Sequence[Path], trial: Trial, log: Path) -
                 volume = estimate.volume.values.tobytes()
             told = {name: [float(value) for value in values] for name, values in estimate.history.items()}
             work = {name: int(count) for name, count in estimate.work.items()}
-            parts = [maps[view].tobytes() for view in sorted(maps)]
-            digest = sha256(b"|".join([*parts, volume, repr((sorted(maps), told, work)).encode()])).hexdigest()
+            sure = checked_confidence(estimate, scene)
+            parts = [values.tobytes() for found in (maps, sure) for _, values in sorted(found.items())]
+            digest = sha256(
+                b"|".join([*parts, volume, repr((sorted(maps), sorted(sure), told, work)).encode()])
+            ).hexdigest()
             return Answer(maps, digest, infinite, touched)
         except BaseException as error:  # whatever a method raises, SystemExit included
             traceback.print_exc()
             return Answer(error=failure(error))
 
 
-def _watch(line: Connection, timeout: float, method: Method, files: Sequence[Path], trial: Trial, log: Path) -> None:
-    """The watcher's process: fork a process that solves the trial, send its answer, kill all that is left."""
-    processes.lead_own_session()  # Ctrl-C is for the check, which then closes the line
-    answers, theirs = Pipe(duplex=False)
-    watcher, pid = os.getpid(), os.fork()
-    if not pid:
-        try:
-            processes.die_with_parent(watcher)
-            for ours in (line, answers):
-                ours.close()
-            memory.confine(limits.room())
-            memory.fill_fresh(trial.garbage)
-            own, found = os.getpid(), solve_here(method, files, trial, log)
-            if os.getpid() == own:  # else this is a copy that the method has forked, and not the one to answer
-                theirs.send(found)
-                os._exit(0)
-        finally:
-            os._exit(1)
-    theirs.close()
+def _solve(method: Method, files: Sequence[Path], trial: Trial, log: Path) -> bytes:
+    """Solve one trial in the new process, whose memory is limited and filled; what goes wrong before is told, too."""
     try:
-        with suppress(OSError):  # the check has gone
-            line.send(_heard(answers, line, pid, timeout))
-    finally:
-        processes.kill_descendants()
+        memory.confine(limits.room())
+        memory.fill_fresh(trial.garbage)
+    except Exception as error:
+        return _packed(Answer(error=failure(error)))
+    return _packed(solve_here(method, files, trial, log))
 
 
-def _heard(answers: Connection, line: Connection, pid: int, timeout: float) -> Answer:
-    """The answer of process `pid`; else an answer that says how it ended, or that the time was up."""
-    end, sources = time.monotonic() + timeout, [answers, line]
-    while time.monotonic() < end:
-        # first whether it has ended, then what it sent: so an answer sent just before the end is not missed
-        ended = processes.reap().get(pid)
-        ready = wait(sources, _TICK if ended is None else 0)
-        if line in ready:
-            return Answer(error="nobody wants to know")
-        if answers in ready:
-            try:
-                found: Answer = answers.recv()
-                return found
-            except EOFError:
-                sources.remove(answers)
-        if ended is not None:
-            code = os.waitstatus_to_exitcode(ended)
-            how = f"signal {-code}" if code < 0 else f"exit status {code}"
-            return Answer(error=f"the method ended its process ({how})")
-    return Answer(error=f"no answer within {timeout:g} s")
+def _packed(answer: Answer) -> bytes:
+    """An answer as an ``.npz``."""
+    facts = {name: getattr(answer, name) for name in _FACTS}
+    arrays: dict[str, Any] = {f"view_{view}": values for view, values in answer.maps.items()}
+    content = BytesIO()
+    np.savez(content, facts=np.array(json.dumps(facts)), **arrays)
+    return content.getvalue()
+
+
+def _unpacked(content: bytes) -> Answer:
+    """The answer that `_packed` made. The method's process may have sent anything: nothing in it is executed."""
+    try:
+        with np.load(BytesIO(content), allow_pickle=False) as arrays:
+            facts = json.loads(str(arrays["facts"]))
+            maps = {int(name[len("view_") :]): arrays[name] for name in arrays.files if name != "facts"}
+        kinds = {name: type(value) for name, value in facts.items()}
+        if kinds != _FACTS or any(values.dtype != np.float32 for values in maps.values()):
+            raise ValueError
+    except Exception:  # whatever numpy, zipfile and json raise
+        return Answer(error="the method sent something else than an answer")
+    return Answer(maps, **facts)
 
 
 def solve_apart(method: Method, files: Sequence[Path], trial: Trial, timeout: float) -> Answer:
@@ -163,18 +149,18 @@ def solve_apart(method: Method, files: Sequence[Path], trial: Trial, timeout: fl
     timeout
         Seconds that the solve may take.
     """
-    with tempfile.TemporaryDirectory(prefix="matbench-check-") as folder:
-        log = Path(folder) / "log.txt"
-        line, theirs = Pipe()
-        process = get_context("forkserver").Process(target=_watch, args=(theirs, timeout, method, files, trial, log))
-        process.start()
-        theirs.close()
+    with temporary_folder() as folder:
+        log = folder / "log.txt"
         try:
-            found: Answer = line.recv()
-        except EOFError:
-            found = Answer(error="the method ended the process that watches it")
-        finally:
-            line.close()
-            process.join()
-        said = log.read_bytes()[-2000:].decode("utf-8", "replace").strip() if log.exists() else ""
-        return evolve(found, output=said)
+            found = _unpacked(call_apart(_solve, (method, files, trial, log), timeout))
+        except NoAnswer as error:
+            found = Answer(error=str(error))
+        return evolve(found, output=_end_of(log))
+
+
+def _end_of(log: Path) -> str:
+    """What a process has printed last; nothing where something else than its plain file lies there by now."""
+    with suppress(OSError, NotPlain), open_plain(log, follow=False) as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - _LAST))
+        return file.read(_LAST).decode("utf-8", "replace").strip()
+    return ""

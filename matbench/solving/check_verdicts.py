@@ -7,10 +7,14 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench.solving.check_scenes import trials
+from matbench.solving.check_scenes import trials, truths
 from matbench.solving.check_solve import Answer
 
 Verdict = Literal["pass", "fail", "skipped", "note"]
+
+RIGHT = 0.5
+"""Share of the wrong pixels that may be left if answers are taken otherwise, so that this is what they are."""
+FACTORS = (2.0, 4.0, 8.0, 16.0, 256.0)
 
 AGREEMENT = 0.99  # share of pixels that must agree: rounding decides ties at single ones
 
@@ -53,6 +57,7 @@ def judge(answers: Mapping[str, Answer]) -> list[CheckResult]:
         _solved("tiny", "images of any size", answers, ["1x1 px", "one row", "one column", "narrower than the range"]),
         _solved("constant", "images without any texture", answers, ["constant"]),
         _in_range(answers),
+        _sense(answers),
         _honest(answers),
         _leaves_input(answers),
         _same("seed", "the same seed gives the same answer", answers, "easy again"),
@@ -102,6 +107,40 @@ def _in_range(answers: Mapping[str, Answer]) -> CheckResult:
     return _seen("range", demand, parts, wrong)
 
 
+def _sense(answers: Mapping[str, Answer]) -> CheckResult:
+    """Would answers be right if they were turned, mirrored or scaled? Then that is what is wrong with them."""
+    demand = "maps are upright, in pixels per view step, and nearer is larger"
+    wrong, parts = {}, {}
+    for name, scene in truths().items():
+        parts[name] = answers[name]
+        found = answers[name].maps.get(scene.ref)
+        if found is None or found.shape != (scene.height, scene.width):
+            continue
+        truth, pair = scene.truth[scene.ref], np.float32(scene.pair_steps)
+        rivals: dict[str, NDArray[np.float32]] = {
+            "upside down: rows of a PFM file go from bottom to top": found[::-1],
+            "mirrored": found[:, ::-1],
+            "turned by half": found[::-1, ::-1],
+            "of the other sign: nearer must be larger": -found,
+            f"in pixels of the pair: divide them by {pair:g}, its view steps": found / pair,
+            **{f"{factor:g} times too large": found / np.float32(factor) for factor in FACTORS},
+            **{f"{factor:g} times too small": found * np.float32(factor) for factor in FACTORS},
+        }
+        flat = np.full_like(truth, np.nanmedian(truth))  # what is far too small is nearly that
+        most = RIGHT * min(_bad(found, truth, pair), _bad(flat, truth, pair))
+        left = {words: _bad(rival, truth, pair) for words, rival in rivals.items()}
+        best = min(left, key=lambda words: left[words])
+        if left[best] <= most:
+            share = f"{_bad(found, truth, pair):.0%} are wrong as they are, {left[best]:.0%} so"
+            wrong[name] = f"answers are {best} ({share})"
+    return _seen("sense", demand, parts, wrong)
+
+
+def _bad(found: NDArray[np.float32], truth: NDArray[np.float32], pair: np.float32) -> float:
+    """The share of pixels that are wrong by more than 1 px of the pair, or missing."""
+    return float(np.mean(~(np.abs(found - truth) * pair <= 1)))
+
+
 def _honest(answers: Mapping[str, Answer]) -> CheckResult:
     demand = "no answer is NaN, never infinite"
     wrong = {name: "infinite" for name, found in answers.items() if found.infinite}
@@ -119,7 +158,7 @@ def _written(answers: Mapping[str, Answer]) -> CheckResult:
         return CheckResult(name, demand, "pass")
     unlike = {view: int((~_agreeing(values, other.maps[view], 0)).sum()) for view, values in first.maps.items()}
     where = ", ".join(f"{count} pixels of view {view}" for view, count in unlike.items() if count)
-    said = f"{where or 'history, work or volume'}: what they hold depends on memory that was never written"
+    said = f"{where or 'history, work, volume or confidence'}: what they hold depends on memory that was never written"
     return CheckResult(name, demand, "fail", said)
 
 
@@ -158,7 +197,9 @@ def _same(name: str, demand: str, answers: Mapping[str, Answer], other: str) -> 
         return CheckResult(name, demand, "fail", f"maps of the views {sorted(one.maps)}, then of {sorted(two.maps)}")
     shares = [np.mean(~_agreeing(one.maps[view], two.maps[view], 0)) for view in one.maps]
     what = (
-        f"{max(shares):.2%} of a map's pixels differ" if max(shares) else "the maps are the same, volume or work differ"
+        f"{max(shares):.2%} of a map's pixels differ"
+        if max(shares)
+        else "the maps are the same; confidence, volume or work differ"
     )
     return CheckResult(name, demand, "fail", what)
 

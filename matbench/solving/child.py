@@ -8,8 +8,8 @@ from multiprocessing.connection import Connection
 from attrs import define, field
 from cattrs.preconf.json import make_converter
 
-from matbench.solving import confinement, processes
-from matbench.solving.worker import Job, Message, serve
+from matbench import linux
+from matbench.solving.worker import Job, Message, print_to, serve
 
 LOG_ENDS = 1 << 16  # bytes kept of the beginning, and of the end, of a cell's output: a method may print without end
 
@@ -102,14 +102,13 @@ class Child:
         if not pid:
             try:
                 os.setsid()  # a method that signals its process group must not reach the keeper
-                processes.die_with_parent(keeper)
+                linux.die_with_parent(keeper)
                 # an end that stayed open here would keep the pipe alive when the keeper or the run has gone
                 for ours in (inbox, line):
                     ours.close()
                 os.close(output)
-                if confined:
-                    confinement.shut_in(job.run, job.settings.memory_each())
-                serve(theirs, printed, job)
+                print_to(printed)
+                serve(theirs, job, confined)
             finally:
                 os._exit(1)  # never back into the keeper's own code, a copy of which this process has
         theirs.close()

@@ -1,83 +1,41 @@
 """Solving the cells of a plan on a Dask cluster.
 
 A worker solves each cell as this machine would: in a process of its own, watched by a keeper, in a
-temporary folder. It sends that folder back as bytes. Users' own files are sent to the worker, with what
-they import beside them. Files that a method reads are not, as they may be large: each worker needs them by the same
-path. Scenes are not sent either: the worker reads them from its own data folder, or from the one named here if it has
-that, and compares digests. A worker with other code or another scene declines the cell.
+temporary folder (`matbench.solving.cluster_worker`). It sends that folder back as bytes. Users' own files are sent to
+the worker, with what they import beside them. Files that a method reads are not, as they may be large: each worker
+needs them by the same path. Scenes are not sent either: the worker reads them from its own data folder, or from the one
+named here if it has that, and compares digests. A worker with other code or another scene declines the cell.
 
-Dask exchanges tasks as pickles: whoever can reach the scheduler can run programs on the workers.
+A worker believes what it is sent: Dask sends tasks as pickles, so whoever can reach the scheduler can run programs on
+the workers. The other way, nothing that comes is believed: a reply is bytes, which are parsed, and nothing that runs is
+unpickled here (`matbench.solving.data_only`).
 """
 
-import atexit
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache
-from multiprocessing import current_process
 from pathlib import Path
-from queue import Empty, SimpleQueue
-from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import Any, Literal
 from uuid import uuid4
 
-from attrs import define, evolve, frozen
+from attrs import evolve
 
 from matbench import code
-from matbench.errors import UserError, failure
+from matbench.errors import UserError, failure, one_line
 from matbench.files.unzip import ArchiveError
-from matbench.plans import plugins
-from matbench.plans.limits import cores
 from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
 from matbench.runs import parcels
 from matbench.runs.outcome import Outcome
 from matbench.runs.store import Store
-from matbench.scenes.catalogue import data_root, load_scene
-from matbench.solving.keeper import Keeper
-from matbench.solving.worker import Job
+from matbench.solving import cluster_worker, processes
+from matbench.solving.cluster_worker import Reply, Task
+from matbench.solving.data_only import data_only, is_guarded
 
 _PATIENCE = "10s"  # that the scheduler has to answer
-_TICK = 0.2  # seconds between two looks at whether the client still wants a task
-
-
-@frozen
-class Task:
-    """A cell on its way to a worker.
-
-    Parameters
-    ----------
-    run
-        The name of the run on the cluster: the topic of its events, and part of its tasks' keys.
-    files
-        The users' own files: the name of each, and by their paths below its folder the content of all that it imports
-        from there, itself included.
-    """
-
-    run: str
-    cell: Cell
-    files: tuple[tuple[str, Mapping[str, bytes]], ...]
-    settings: Settings
-
-
-@frozen
-class Reply:
-    """A worker's reply: the solved cell, or why it declined to solve it.
-
-    Parameters
-    ----------
-    worker
-        The worker's address.
-    parcel
-        The cell's folder, packed (`matbench.runs.parcels`).
-    declined
-        The reason; empty if the cell was solved.
-    """
-
-    worker: str
-    parcel: bytes = b""
-    declined: str = ""
+_PAUSE = 0.05  # seconds between two looks at whether a reply has come
 
 
 def run_cells(
@@ -107,10 +65,10 @@ def run_cells(
     if settings.dask == "local":
         settings = evolve(settings, threads=settings.threads_each(), memory=settings.memory_each())
     files = tuple((Path(file).name, _with_helpers(Path(file))) for file in plan.plugin_files)
-    with _client(settings) as client:
+    with _guard(settings) as refused, _client(settings) as client:
         from distributed import as_completed
 
-        arriving = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+        arriving = as_completed(loop=client.loop, raise_errors=False)
         this_run = f"matbench-{uuid4().hex}"
         waiting = {cell.key: cell for cell in todo}
         telling = Lock()  # a cell's start is reported in a thread of the Dask client, its end in this one
@@ -131,25 +89,38 @@ def run_cells(
             # other workers stay allowed: without that, a task waits for ever if the preferred ones leave the cluster
             chosen = {"workers": _other_workers(client, before), "allow_other_workers": True} if before else {}
             # pure=False and a key of its own: Dask would else return an earlier run's result of the same task
-            future = client.submit(solve_task, task, key=(this_run, task.cell.key, len(before)), pure=False, **chosen)
+            future = client.submit(
+                cluster_worker.solve_task, task, key=(this_run, task.cell.key, len(before)), pure=False, **chosen
+            )
             tasks[future.key], futures[future.key] = (task, before), future
             arriving.add(future)
 
         client.subscribe_topic(this_run, lambda event: begins(event[1]))
         try:
             for cell in todo:
-                submit(Task(this_run, cell, files, settings), [])
-            for future, reply in arriving:
-                task, before = tasks.pop(future.key)
-                del futures[future.key]
-                if future.status == "finished" and reply.declined and _other_workers(client, [*before, reply]):
-                    submit(task, [*before, reply])
-                    continue
-                ends(task.cell, _keep_reply(store, task.cell, future, reply, before))
+                submit(Task(this_run, cell, (*files, *_own_file(cell)), settings), [])
+            while not arriving.is_empty():
+                _stop_at(refused, settings)
+                # not waiting for the next one: what was refused may have been the message that it has come
+                for future in arriving.next_batch(block=False) if arriving.has_ready() else _pause():
+                    task, before = tasks.pop(future.key)
+                    del futures[future.key]
+                    reply = _reply(future)
+                    _stop_at(refused, settings)
+                    if isinstance(reply, Reply) and reply.declined and _other_workers(client, [*before, reply]):
+                        submit(task, [*before, reply])
+                        continue
+                    ends(task.cell, _keep_reply(store, task.cell, future, reply, before))
         finally:
             with telling:
                 waiting.clear()  # late events tell nothing any more
             client.cancel(list(futures.values()), force=True)
+
+
+def _own_file(cell: Cell) -> list[tuple[str, dict[str, bytes]]]:
+    """The file that a cell's method was named with, the last of its task's, if there is one."""
+    file = cell.method.file
+    return [(Path(file).name, _with_helpers(Path(file)))] if file else []
 
 
 def _with_helpers(file: Path) -> dict[str, bytes]:
@@ -165,21 +136,62 @@ def _other_workers(client: Any, declined: Sequence[Reply]) -> list[str]:
     return [worker for worker in client.scheduler_info(n_workers=-1)["workers"] if worker not in tried]
 
 
-def _keep_reply(store: Store, cell: Cell, future: Any, reply: Any, before: Sequence[Reply]) -> Outcome:
+def _stop_at(refused: Sequence[str], settings: Settings) -> None:
+    """Raise UserError if something was refused: who sends programs is no worker to go on with."""
+    if refused:
+        raise UserError(
+            f"the cluster {settings.dask} sent a program, {refused[0]}, which was not run: "
+            "is every worker of it yours? What is finished stays"
+        )
+
+
+def _pause() -> tuple[()]:
+    time.sleep(_PAUSE)
+    return ()
+
+
+def _reply(future: Any) -> Reply | Exception | None:
+    """A worker's reply; what is wrong with it, or why there is none; None if it was cancelled."""
+    try:
+        if future.status == "finished":
+            return Reply.unpacked(future.result())
+        return None if future.status == "cancelled" else future.exception()
+    except Exception as error:  # of Dask, and whatever it could not read
+        return error
+
+
+def _keep_reply(
+    store: Store, cell: Cell, future: Any, reply: Reply | Exception | None, before: Sequence[Reply]
+) -> Outcome:
     """Put an arrived cell into the run folder; its outcome, or the outcome that says why none came."""
     wrong = Outcome("failed", alone=False)
-    if future.status == "finished" and not reply.declined:
-        try:
-            return parcels.put(store, cell, reply.parcel)
-        except (ArchiveError, OSError) as error:
-            return evolve(wrong, reason=f"its cell could not be written: {error}")
-    if future.status == "finished":
+    if reply is None:
+        return evolve(wrong, status="interrupted", reason="the cluster has dropped it")
+    if isinstance(reply, Exception):
+        if future.status == "finished":
+            return evolve(wrong, reason=f"a worker's answer cannot be used: {one_line(reply)}")
+        return evolve(wrong, status="crashed", reason=f"no worker finished it: {failure(reply)}")
+    if reply.declined:
         every = {one.declined: one.worker for one in [*before, reply]}
         return evolve(wrong, reason="; ".join(f"{why} ({worker})" for why, worker in every.items()))
-    if future.status == "cancelled":
-        return evolve(wrong, status="interrupted", reason="the cluster has dropped it")
-    lost = reply[1] if isinstance(reply, tuple) else reply
-    return evolve(wrong, status="crashed", reason=f"no worker finished it: {failure(lost)}")
+    try:
+        return parcels.put(store, cell, reply.parcel)
+    except (ArchiveError, OSError) as error:
+        return evolve(wrong, reason=f"its cell could not be written: {error}")
+
+
+@contextmanager
+def _guard(settings: Settings) -> Iterator[list[str]]:
+    """Nothing that a cluster sends is run; the names of what was refused. A local one is this process's own."""
+    if settings.dask == "local":
+        yield []
+        return
+    with data_only() as refused:
+        yield refused
+
+
+async def _reads_data_only() -> bool:
+    return is_guarded()
 
 
 @contextmanager
@@ -187,6 +199,7 @@ def _client(settings: Settings) -> Iterator[Any]:
     """A client of the cluster that the settings name. A local cluster is started, and ends with the client."""
     try:
         from distributed import Client, LocalCluster
+        from distributed.comm.addressing import resolve_address
     except ImportError as error:
         raise UserError("--dask needs Dask: pip install 'matbench-stereo[cluster]'") from error
 
@@ -195,11 +208,16 @@ def _client(settings: Settings) -> Iterator[Any]:
     cluster: Any = None
     try:
         if settings.dask == "local":
-            cluster = LocalCluster(
-                n_workers=settings.jobs, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
-            )
-        client = Client(cluster or settings.dask, timeout=_PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:  # TimeoutError, too
+            with processes.no_daemon():
+                cluster = LocalCluster(
+                    n_workers=settings.jobs, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+                )
+        else:
+            resolve_address(settings.dask or "")  # `Client` would leave a traceback behind
+        client: Any = Client(cluster or settings.dask, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError, RuntimeError) as error:  # TimeoutError, too
+        if settings.dask == "local" and cluster is None:
+            raise UserError(f"Dask's workers cannot be started here: {one_line(error)}") from error
         if cluster is not None:
             cluster.close()
         raise UserError(
@@ -207,6 +225,10 @@ def _client(settings: Settings) -> Iterator[Any]:
         ) from error
     patience = 2  # seconds to close after Ctrl-C, when a user will not wait; more after a whole run
     try:
+        if cluster is None and not client.sync(_reads_data_only):
+            raise UserError(
+                "this version of Dask reads in other ways than those that are known to be safe: use another"
+            )
         yield client
         patience = 10
     finally:
@@ -214,165 +236,7 @@ def _client(settings: Settings) -> Iterator[Any]:
             if one is not None:
                 with suppress(Exception):
                     one.close(timeout=patience)
-
-
-# on the workers
-
-
-def solve_task(task: Task) -> Reply:
-    """Solve a cell. This runs on a Dask worker."""
-    from distributed import get_worker
-
-    worker = get_worker()
-    with TemporaryDirectory(prefix="matbench-") as folder:
-        files = _write_files(task.files, Path(folder))
-        root = _data_folder(task.settings.data)
-        why = _why_declined(task.cell, files, root)
-        if why:
-            return Reply(worker.address, declined=why)
-        worker.log_event(task.run, task.cell.key)
-        at_once = worker.state.nthreads
-        settings = evolve(
-            task.settings,
-            data=root,
-            threads=task.settings.threads or max(1, cores() // at_once),
-            memory=task.settings.memory or evolve(task.settings, jobs=min(at_once, 256)).memory_each(),
-        )
-        store = Store(Path(folder) / "run")
-        (store.folder / "cells").mkdir(parents=True)
-        job = Job(store.folder, task.cell, files, settings.threads_each(), settings, alone=False)
-        outcome = _have_solved(job, worker, worker.get_current_task())
-        if not store.cell(task.cell).exists():
-            return Reply(worker.address, declined=outcome.reason)
-        return Reply(worker.address, parcels.pack(store.cell(task.cell)))
-
-
-def _have_solved(job: Job, worker: Any, key: Any) -> Outcome:
-    """Have a keeper of this worker solve a cell; dismiss the keeper if the client has cancelled the task.
-
-    Dask cannot interrupt a task that runs, so the task itself looks whether it is still wanted.
-    """
-    keeper = _keepers.get()
-    lives = False
-    try:
-        keeper.begin(job)
-        while not keeper.line.poll(_TICK):
-            wanted = worker.state.tasks.get(key)
-            if wanted is None or wanted.state != "executing":
-                return Outcome("interrupted", reason="nobody wants it any more")
-        outcome, lives = keeper.outcome(job)
-        return outcome
-    finally:
-        if lives:
-            _keepers.free.put(keeper)
-        else:
-            keeper.dismiss()
-            keeper.wait()
-
-
-@define
-class Keepers:
-    """The keepers of this worker process, kept for later cells: at most as many as cells have run at once.
-
-    Parameters
-    ----------
-    free
-        Those that have no cell now.
-    starting
-        Held while one is started, as that changes the state of the whole process for a moment.
-    """
-
-    free: "SimpleQueue[Keeper]"
-    starting: Lock
-
-    def get(self) -> Keeper:
-        """A free one, or a new one."""
-        with suppress(Empty):
-            return self.free.get_nowait()
-        from matbench.runs.provenance import commit_known
-        from matbench.solving.environment import kernel_cache_in_use, without_main
-
-        # Dask's workers are daemonic processes, which `multiprocessing` lets start no children, as these could
-        # outlive them. Keepers cannot: they end with their line. So the mark is taken off for this moment.
-        with self.starting, without_main(), kernel_cache_in_use(), commit_known():
-            config = current_process()._config  # type: ignore[attr-defined]
-            before = config.get("daemon")
-            config["daemon"] = False
-            try:
-                return Keeper(_built_in())
-            finally:
-                config["daemon"] = before
-
-    def dismiss(self) -> None:
-        """End all free keepers."""
-        with suppress(Empty):
-            while True:
-                self.free.get_nowait().dismiss()
-
-
-def _built_in() -> list[str]:
-    """The modules of all built-in methods and datasets: a worker does not know which cells it will be given."""
-    every = [*plugins.installed("algorithms").values(), *plugins.installed("datasets").values()]
-    entries = [plugin.entry for plugin in every if plugin.source == "matbench-stereo"]
-    return [entry.module for entry in entries if not isinstance(entry, type)]
-
-
-_keepers = Keepers(SimpleQueue(), Lock())
-atexit.register(_keepers.dismiss)
-
-
-def _write_files(files: Sequence[tuple[str, Mapping[str, bytes]]], folder: Path) -> tuple[str, ...]:
-    """Write the users' files, each into a folder of its own: names may be equal, and count in digests. Their paths."""
-    for number, (_, contents) in enumerate(files):
-        for name, content in contents.items():
-            path = folder / str(number) / name
-            if not path.resolve().is_relative_to((folder / str(number)).resolve()):  # ../x would be written elsewhere
-                raise ValueError(f"{name!r} is no path below a folder")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-    return tuple(str(folder / str(number) / name) for number, (name, _) in enumerate(files))
-
-
-def _data_folder(named: Path | None) -> Path | None:
-    """This worker's folder of real scenes: its own, else the one that the client names if it exists here."""
-    with suppress(UserError):
-        own = data_root()
-        if own is not None:
-            return own
-    return named if named is not None and named.is_dir() else None
-
-
-def _why_declined(cell: Cell, files: Sequence[str], root: Path | None) -> str:
-    """Why this worker must decline: it has other code, or lacks the scene or has another; empty if it need not."""
-    name, known = cell.method.algorithm, plugins.installed("algorithms")
-    candidates = [plugins.Plugin(name, file, object) for file in files]
-    candidates += [known[name]] if name in known else []
-    if not candidates:
-        return f"the worker has no method {name}: install what offers it there"
-    try:
-        is_same = cell.method.code in map(plugins.code_digest, candidates) or cell.method.code == _code_digest(
-            cell, files
-        )
-    except (ImportError, OSError, UserError) as error:
-        return f"the worker cannot use {name}: {failure(error)}"
-    if not is_same:
-        return f"the worker has other code of {name}, or other versions of what it imports: install the same"
-    try:
-        own = () if cell.scene.partition("/")[0] in plugins.installed("datasets") else tuple(files)
-        if _scene_digest(cell.scene, root, own) != cell.scene_digest:
-            return f"the worker's {cell.scene} is another one: give all workers the same data"
-    except Exception as error:
-        return f"the worker has not {cell.scene}: {failure(error)}"
-    return ""
-
-
-def _code_digest(cell: Cell, files: Sequence[str]) -> str:
-    """The digest of a cell's method and of the files that it names; an instance is built, as only that names them."""
-    plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in files])
-    return plugins.method_digest(plugin, plugin.make(cell.method.params))
-
-
-@cache
-def _scene_digest(scene: str, root: Path | None, files: tuple[str, ...]) -> str:
-    """The digest of a scene as this machine has it; `files` may hold its dataset."""
-    return load_scene(scene, root, files).digest
+                    continue
+                if one is client:  # it would try again when it is forgotten, and print why it cannot
+                    one.status, loop = "closed", one.loop
+                    loop.add_callback(loop.stop)

@@ -7,10 +7,11 @@ confined and `shut_in` says so; what a method then rewrites is found out by dige
 import ctypes
 import os
 import sys
-import tempfile
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+
+from matbench.files.temporary import temporary_folder
 
 _NEWNS, _NEWUSER = 0x00020000, 0x10000000  # unshare(2)
 _RDONLY, _NOSUID, _NODEV, _REMOUNT, _BIND, _REC, _PRIVATE = 1, 2, 4, 32, 4096, 16384, 1 << 18  # mount(2)
@@ -57,11 +58,11 @@ def is_possible() -> bool:
     """
     if os.environ.get(UNCONFINED):
         return False
-    with tempfile.TemporaryDirectory(prefix="matbench-") as folder:
+    with temporary_folder() as folder:
         pid = os.fork()
         if not pid:
             try:
-                os._exit(0 if shut_in(Path(folder), 1) else 1)
+                os._exit(0 if shut_in(folder, 1) else 1)
             finally:
                 os._exit(1)
         return os.waitpid(pid, 0)[1] == 0

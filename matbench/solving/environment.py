@@ -1,13 +1,12 @@
-"""What a new process inherits: which main script it would run again, and where compiled kernels are kept."""
+"""What a new process inherits: the main script that it would run again, variables, where compiled kernels are kept."""
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import ModuleType
 
-from matbench.errors import UserError
-from matbench.plans import plugins
+from matbench.plans import kernels, plugins
 
 
 @contextmanager
@@ -27,21 +26,32 @@ def without_main() -> Iterator[None]:
 
 
 @contextmanager
+def variables(values: Mapping[str, str]) -> Iterator[None]:
+    """Within the block, these variables are set for processes that are started."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
 def kernel_cache_in_use() -> Iterator[None]:
     """Have processes started in this block share compiled kernels, in a folder for this state of the code.
 
     numba notices a changed source file, but not a changed file that this one imports. A folder for each
     state of the code keeps it from loading a kernel that was compiled from other code.
+
+    Where the user's cache folder cannot be used, matplotlib is given a place, too: each process would else make one of
+    its own, and those that are killed would leave it.
     """
-    before = os.environ.get("NUMBA_CACHE_DIR")
-    with suppress(OSError, UserError):  # where no folder can be made, each process compiles its kernels itself
-        place = plugins.kernel_cache()
-        place.mkdir(parents=True, exist_ok=True)
-        os.environ["NUMBA_CACHE_DIR"] = str(place)
-    try:
+    changed = {kernels.VARIABLE: str(plugins.kernel_cache())}
+    if (aside := kernels.aside()) is not None:
+        changed["MPLCONFIGDIR"] = os.environ.get("MPLCONFIGDIR") or str(aside / "matplotlib")
+    with variables(changed):
         yield
-    finally:
-        if before is None:
-            os.environ.pop("NUMBA_CACHE_DIR", None)
-        else:
-            os.environ["NUMBA_CACHE_DIR"] = before

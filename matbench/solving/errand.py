@@ -10,8 +10,8 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from typing import NoReturn
 
+from matbench import linux
 from matbench.errors import failure
-from matbench.solving import processes
 
 
 class Late(Exception):
@@ -62,8 +62,8 @@ def _do(errand: Callable[[], None], keeper: int, line: Connection) -> NoReturn:
     said = "RuntimeError: the process that reads scenes has ended"
     try:
         os.setsid()
-        processes.die_with_parent(keeper)
-        processes.keep_private()
+        linux.die_with_parent(keeper)
+        linux.keep_private()
         errand()
         said = ""
     except BaseException as error:  # whatever a dataset raises, SystemExit included

@@ -4,9 +4,6 @@ Nothing there is believed: files must be plain ones of a bounded size, maps must
 keeper has counted itself, seconds above all, does not come from there.
 """
 
-import json
-import os
-import stat
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -15,12 +12,13 @@ from attrs import evolve
 from cattrs.preconf.json import make_converter
 from numpy.typing import NDArray
 
+from matbench.files.documents import read_json
+from matbench.files.plain import open_plain
+from matbench.runs.cell_files import MOST_FACTS, read_confidence, read_maps
 from matbench.runs.outcome import Outcome
-from matbench.runs.store import read_maps
 from matbench.scene import Scene
 from matbench.solving.worker import OUTCOME
 
-_MOST_FACTS = 1 << 24  # bytes of an outcome: histories of long runs take some
 _MOST_FILE = 1 << 32
 _PIECE = 1 << 20
 
@@ -36,12 +34,14 @@ def outcome(folder: Path) -> Outcome:
         If it says nothing that can be read.
     """
     try:
-        with _open(folder / OUTCOME, _MOST_FACTS) as file:
-            return _json.structure(json.loads(file.read(_MOST_FACTS)), Outcome)
+        found = _json.structure(read_json(folder / OUTCOME, most=MOST_FACTS, follow=False), Outcome)
     except (OSError, ValueError):
         raise
     except Exception as error:  # whatever cattrs raises
         raise ValueError("it holds no outcome") from error
+    if wrong := found.implausible:
+        raise ValueError(f"it claims {wrong}")
+    return found
 
 
 def maps(path: Path, scene: Scene) -> Mapping[int, NDArray[np.float32]]:
@@ -52,14 +52,26 @@ def maps(path: Path, scene: Scene) -> Mapping[int, NDArray[np.float32]]:
     ValueError, OSError
         If they are not.
     """
-    found = read_maps(path)
-    shape = (scene.height, scene.width)
-    for view, values in found.items():
-        if not 0 <= view < scene.n or values.shape != shape:
-            raise ValueError(f"the map of view {view} is {values.shape}, not {shape}")
+    return _of_scene(read_maps(path, (scene.height, scene.width), follow=False), scene)
+
+
+def _of_scene(found: Mapping[int, NDArray[np.float32]], scene: Scene) -> Mapping[int, NDArray[np.float32]]:
+    if wrong := [view for view in found if not 0 <= view < scene.n]:
+        raise ValueError(f"there is a map of view {wrong[0]}, the scene has the views 0 to {scene.n - 1}")
     if scene.ref not in found:
         raise ValueError(f"there is no map of the reference view {scene.ref}")
     return found
+
+
+def confidence(path: Path, scene: Scene) -> Mapping[int, NDArray[np.float32]]:
+    """The confidence maps in a file, which must be those of a scene.
+
+    Raises
+    ------
+    ValueError, OSError
+        If they are not.
+    """
+    return _of_scene(read_confidence(path, (scene.height, scene.width), follow=False), scene)
 
 
 def take(source: Path, target: Path) -> bool:
@@ -73,24 +85,13 @@ def take(source: Path, target: Path) -> bool:
         If it is something else than a plain file, or too large.
     """
     try:
-        file = _open(source, _MOST_FILE)
+        file = open_plain(source, most=_MOST_FILE, follow=False)
     except FileNotFoundError:
         return False
     with file, target.open("xb") as copy:
         while piece := file.read(_PIECE):
             copy.write(piece)
     return True
-
-
-def _open(path: Path, most: int):  # type: ignore[no-untyped-def]
-    """Open a file for reading without following a link or waiting at a pipe."""
-    number = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    file = os.fdopen(number, "rb")
-    facts = os.fstat(number)
-    if not stat.S_ISREG(facts.st_mode) or facts.st_size > most:
-        file.close()
-        raise ValueError(f"{path.name} is no plain file of at most {most} bytes")
-    return file
 
 
 def corrected(found: Outcome, outside: float) -> Outcome:

@@ -3,10 +3,10 @@
 What goes on in a keeper is told in `matbench.solving.keeper_process`.
 """
 
+import time
 from collections.abc import Iterable
 from contextlib import suppress
-from multiprocessing import Pipe, get_context
-from typing import TYPE_CHECKING
+from multiprocessing import Pipe
 
 from attrs import evolve
 
@@ -14,44 +14,60 @@ from matbench.runs.outcome import Outcome
 from matbench.runs.store import Store
 from matbench.solving import processes
 from matbench.solving.keeper_process import keep
+from matbench.solving.watcher import Watcher
 from matbench.solving.worker import Job
 
-if TYPE_CHECKING:
-    from multiprocessing.context import ForkServerProcess
-
-_PATIENCE = 5.0  # seconds that a dismissed keeper has to end its processes
+LOOK = 0.5
+"""Seconds after which a run looks again whether its keepers are lost (`Keeper.is_lost`)."""
+_GRACE = 300.0  # seconds beyond a cell's time: its answer is checked and written, perhaps to a slow disk
+_MOST_WORDS = 1 << 16  # bytes of what a keeper says
 
 
 class Keeper:
-    """A handle on a keeper's process, held by the run. It is forked from the server of `processes.start_server`.
+    """A handle on a keeper's process, held by the run.
 
     Parameters
     ----------
     preload
-        Modules that the server imports besides the harness.
+        Modules that the fork server imports besides the harness.
     """
 
     def __init__(self, preload: Iterable[str] = ()) -> None:
-        processes.start_server(["matbench.solving.keeper_process", "cv2", "threadpoolctl", *preload])
+        own = ["matbench.solving.keeper_process", "matbench.solving.numba_ready"]
+        processes.start_server([*own, "cv2", "threadpoolctl", *preload])
         self.line, theirs = Pipe()
-        self._process: ForkServerProcess = get_context("forkserver").Process(target=keep, args=(theirs,))
-        self._process.start()
+        self._watcher = Watcher(keep, (theirs,))
         theirs.close()  # else this process itself would keep the line open when the keeper dies
+        self._end: float | None = None
+        self._lost = ""
 
     def begin(self, job: Job) -> None:
         """Start a cell. `line` becomes readable when `outcome` has an answer."""
+        limit = job.settings.timeout
+        self._end = None if limit is None else time.monotonic() + limit + _GRACE
         with suppress(ConnectionError):  # `outcome` says so
             self.line.send(job)
 
+    def is_lost(self) -> bool:
+        """Will no answer come any more, as a method has stopped this keeper, say? To be asked again and again."""
+        if self._watcher.is_stopped():
+            self._lost = "its keeper was stopped"
+        elif self._end is not None and time.monotonic() > self._end:
+            self._lost = "its keeper has given no answer"
+        return bool(self._lost)
+
     def outcome(self, job: Job) -> tuple[Outcome, bool]:
-        """Wait for the answer: the cell's outcome, and whether this keeper is still alive."""
+        """Wait for the answer: the cell's outcome, and whether this keeper is still of use."""
         wrong = Outcome("failed", threads=job.threads, alone=job.alone)
+        while not self.line.poll(LOOK):
+            if self.is_lost():
+                return evolve(wrong, status="crashed", reason=self._lost), False
         try:
-            said = self.line.recv()
+            said = self.line.recv_bytes(_MOST_WORDS).decode("utf-8", "replace")
         except (EOFError, OSError):
             return evolve(wrong, status="crashed", reason="its keeper was killed"), False
         if said:
-            return evolve(wrong, reason=f"its cell could not be written: {said}"), True
+            return evolve(wrong, reason=f"it could not be solved or stored: {said}"), True
         found = Store(job.run).outcome(job.cell)
         return found or evolve(wrong, reason="the cell's process left no result"), True
 
@@ -60,11 +76,8 @@ class Keeper:
         self.line.close()
 
     def wait(self) -> None:
-        """Wait until a dismissed keeper has ended; after `_PATIENCE` seconds kill it."""
-        self._process.join(_PATIENCE)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join(_PATIENCE)
+        """Wait until a dismissed keeper has ended, with all that was below it."""
+        self._watcher.end(at_once=bool(self._lost))
 
 
 def dismiss(keepers: Iterable[Keeper]) -> None:

@@ -11,47 +11,41 @@ the run was killed, the keeper kills everything below it and ends. So nothing ou
 """
 
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
+from errno import ENOTDIR, ENOTEMPTY
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
 from attrs import define, evolve, field
 
-from matbench.errors import UserError
+from matbench.errors import UserError, one_line
+from matbench.files.removal import remove
+from matbench.files.temporary import temporary_folder
 from matbench.plans import plugins
-from matbench.plans.limits import cores
+from matbench.plans.plan import Cell
+from matbench.runs.cell_files import CONFIDENCE, maps_digest, write_cell
 from matbench.runs.outcome import FINAL, Outcome
-from matbench.runs.store import Store, maps_digest, write_cell
+from matbench.runs.store import Store
 from matbench.scenes import views_only
-from matbench.solving import confinement, disturbance, errand, intake, memory, processes
+from matbench.solving import confinement, errand, intake, memory, processes
 from matbench.solving.child import Child, Log
 from matbench.solving.control_group import ControlGroup
+from matbench.solving.ending import how_it_ended, print_stack
+from matbench.solving.stopwatch import Stopwatch
 from matbench.solving.worker import MAPS, TOLD, VOLUME, Job, Order
 
 _TICK = 0.05  # seconds between two looks at a process
 _TREE_LOOKS = 10  # every tenth look includes the processes that it started: these take longer to find and to measure
-_STACK_SECONDS = 0.5  # that a process has to print its stack before it is killed
+_MOST_WORDS = 1 << 12  # bytes of what is said to the run
 
 
 class Dismissed(Exception):
     """Nobody holds the other end of the keeper's line any more."""
-
-
-@define
-class Count:
-    """What the keeper counts of a timed solve: the machine before and after it, and the most memory held."""
-
-    start: disturbance.Moment | None = None
-    begin: disturbance.Moment | None = None
-    end: disturbance.Moment | None = None
-    peak_mb: float = 0.0
 
 
 @define
@@ -62,8 +56,10 @@ class Keeping:
     ----------
     place
         A folder of its own, for scenes and answers.
+    places
+        What removes it at the end, and those that were there before.
     scene
-        What the views that lie in `views` are of: the scene's name, and its digest.
+        What the views that lie in `views` are of, the scene's name and its digest, and what the file is known by.
     group
         Counts the memory of the child and of all that it starts, where the system lets this user make one.
     shared
@@ -72,10 +68,11 @@ class Keeping:
 
     inbox: Connection
     place: Path
+    places: ExitStack
     is_confining: bool
     group: ControlGroup | None
     child: Child | None = None
-    scene: tuple[str, str] | None = None
+    scene: tuple[str, str, tuple[int, ...]] | None = None
     shared: set[Path] = field(factory=set)
 
     @property
@@ -93,18 +90,15 @@ class Keeping:
         limit = job.settings.timeout
         end = None if limit is None else time.monotonic() + limit
         with Store(job.run).building(job.cell) as draft:
-            (draft / "log.txt").touch()
             failed = self._read_scene(job, end)
             if failed is not None:
                 write_cell(draft, job.cell, evolve(failed, threads=job.threads, alone=job.alone))
                 return
-            if self.child is not None:
-                if self._attempt(job, draft, end):
-                    return
-                # earlier cells may have spoiled a shared process: this cell gets a second chance in a fresh one.
-                # Not after a timeout: the cell would take the whole time again.
-                _empty(draft)
-            plugins.read_ahead(job.cell.method.algorithm, job.plugin_files)
+            if self.child is not None and self._attempt(job, draft, end):
+                return
+            # earlier cells may have spoiled a shared process: this cell gets a second chance in a fresh one.
+            # Not after a timeout: the cell would take the whole time again.
+            plugins.read_ahead(job.cell.method.algorithm, [*job.plugin_files, *filter(None, [job.cell.method.file])])
             self.child = Child.fork(job, self.inbox, self.is_confining)
             if self.group is not None:
                 self.group.take(self.child.pid)
@@ -113,9 +107,15 @@ class Keeping:
     def _read_scene(self, job: Job, end: float | None) -> Outcome | None:
         """Have the scene's views written, unless they lie there; what the cell comes to where they cannot be."""
         wanted = job.cell.scene, job.cell.scene_digest
-        if self.scene == wanted:
+        if self.scene == (*wanted, _known_by(self.views)):
             return None
         self.scene = None
+        if not _is_folder(self.place):  # a method has the right to remove it, or to put something else there
+            self.place = self.places.enter_context(temporary_folder())
+        remove(self.views)
+        if job.views is not None and _copied(*job.views, self.views, job.cell):
+            self.scene = (*wanted, _known_by(self.views))
+            return None
         name, data, views, files = job.cell.scene, job.settings.data, self.views, job.plugin_files
 
         def read() -> None:
@@ -132,7 +132,7 @@ class Keeping:
             return Outcome("timeout", reason=f"stopped after {job.settings.timeout:g} s")
         if said:
             return Outcome("failed", reason=said)
-        self.scene = wanted
+        self.scene = (*wanted, _known_by(self.views))
         return None
 
     def _attempt(self, job: Job, draft: Path, end: float | None) -> bool:
@@ -141,11 +141,11 @@ class Keeping:
         A child that is not fit for another cell is ended, with all that it started.
         """
         assert self.child is not None, "the caller has seen to that"  # noqa: S101
-        log, count, stays = Log(self.child.output), Count(), False
-        shutil.rmtree(self.answer, ignore_errors=True)
+        log, watch, stays = Log(self.child.output), Stopwatch(self.child.pid), False
+        remove(self.answer)
         self.answer.mkdir()
         try:
-            outcome = self._watch(self.child, job, end, log, count)
+            outcome = self._watch(self.child, job, end, log, watch)
             stays = outcome is None and self.child.is_fit and job.settings.isolation == "shared"
         finally:
             # first kill, then drain, then close: else output is lost, or the child still prints into a closed pipe
@@ -154,17 +154,17 @@ class Keeping:
             log.drain()
             if not stays:
                 self.end_child()
+        _empty(draft)  # where it was within reach, the method may have put anything there
         if outcome is None:
-            outcome = self._taken(job, draft, count, end)
+            outcome = self._taken(job, draft, watch, end)
         if outcome.status != "ok":
             _empty(draft)
         ran_on = {"run folder": "read-only for methods" if self.is_confining else "within reach of methods"}
         outcome = evolve(outcome, threads=job.threads, alone=job.alone, ran_on=ran_on)
-        write_cell(draft, job.cell, outcome)
-        (draft / "log.txt").write_bytes(log.whole())
+        write_cell(draft, job.cell, outcome, log=log.whole())
         return stays or outcome.status in FINAL or outcome.status == "timeout"
 
-    def _watch(self, child: Child, job: Job, end: float | None, log: Log, count: Count) -> Outcome | None:
+    def _watch(self, child: Child, job: Job, end: float | None, log: Log, watch: Stopwatch) -> Outcome | None:
         """Wait until the child has answered: None, or what the cell comes to without an answer.
 
         Raises
@@ -176,7 +176,7 @@ class Keeping:
         """
         limit, kills = job.settings.memory_each(), memory.kills_for_memory()
         sources: list[Any] = [self.inbox, child.output, child.line]
-        count.start = disturbance.moment(child.pid)
+        watch.begin_warm_up()
         with suppress(OSError):  # it has ended already: seen below
             child.line.send(Order(job, self.views, self.answer))
         looks, next_look = 0, time.monotonic()
@@ -188,7 +188,7 @@ class Keeping:
                 sources.remove(child.output)  # a closed pipe is always ready, and `wait` would not wait any more
             if child.line in ready:
                 try:
-                    if _heard(child, count):
+                    if _heard(child, watch):
                         return None
                 except EOFError:
                     sources.remove(child.line)
@@ -198,10 +198,10 @@ class Keeping:
                     )
             if child.pid in (ended := processes.reap()):
                 log.drain()
-                return _how_it_ended(ended[child.pid], log, kills)
+                return how_it_ended(ended[child.pid], log, kills)
             now = time.monotonic()
             if end is not None and now > end:
-                _print_stack(child, log)
+                print_stack(child, log)
                 return Outcome("timeout", reason=f"stopped after {job.settings.timeout:g} s")
             if now < next_look:
                 continue
@@ -212,13 +212,12 @@ class Keeping:
                 used = max(used, self.group.used() or 0.0)
             if not self.is_confining and looks % _TREE_LOOKS == 0:
                 self.shared |= memory.left_in_shared_memory(child.pid)
-            if count.begin is not None and count.end is None:
-                count.peak_mb = max(count.peak_mb, used)
+            watch.take_memory(used)
             if used > limit:
-                _print_stack(child, log)
+                print_stack(child, log)
                 return Outcome("out-of-memory", reason=f"stopped: it held {used:.0f} MiB, {limit} MiB are its limit")
 
-    def _taken(self, job: Job, draft: Path, count: Count, end: float | None) -> Outcome:
+    def _taken(self, job: Job, draft: Path, watch: Stopwatch, end: float | None) -> Outcome:
         """Check what the child has left and take it in; what the cell comes to."""
         try:
             outcome = intake.outcome(self.answer)
@@ -226,23 +225,30 @@ class Keeping:
                 return outcome
             if not intake.take(self.answer / MAPS, draft / MAPS):
                 raise ValueError("it has left no maps")
+            if self.scene is None or self.scene[2] != _known_by(self.views):
+                raise ValueError("the views of its scene were changed")
             scene = views_only.read_views(self.views)
             maps = intake.maps(draft / MAPS, scene)
             intake.take(self.answer / VOLUME, draft / VOLUME)
-            outcome = _timed(evolve(outcome, maps=maps_digest(maps)), count, job.threads)
+            sure = ""
+            if intake.take(self.answer / CONFIDENCE, draft / CONFIDENCE):
+                sure = maps_digest(intake.confidence(draft / CONFIDENCE, scene))
+            outcome = watch.timed(evolve(outcome, maps=maps_digest(maps), confidence=sure), job.threads)
             if job.settings.record is not None and not job.cell.repeat and not outcome.reason:
                 outcome = self._record(job, draft, outcome, scene.height, end)
-        except ValueError as error:
-            return Outcome("failed", reason=f"its answer cannot be used: {error}")
         except errand.Late:
             return Outcome("timeout", reason=f"stopped after {job.settings.timeout:g} s")
+        except (OSError, Dismissed):
+            raise
+        except Exception as error:  # whatever can be raised for a file that may hold anything
+            return Outcome("failed", reason=f"its answer cannot be used: {one_line(error)}")
         return outcome
 
     def _record(self, job: Job, draft: Path, outcome: Outcome, height: int, end: float | None) -> Outcome:
         """Have a recording made of what the method told; the outcome with what was recorded, or why nothing was."""
         assert job.settings.record is not None, "the caller has looked"  # noqa: S101
         heard, name, data, files = self.place / TOLD, job.cell.scene, job.settings.data, job.plugin_files
-        heard.unlink(missing_ok=True)
+        remove(heard)
         if not intake.take(self.answer / TOLD, heard):
             return evolve(outcome, reason="not recorded: it has told nothing")
 
@@ -254,7 +260,7 @@ class Keeping:
             rrd.record_told(draft / "recording.rrd", scene, told.read_told(heard), title=str(job.cell))
 
         said = self._errand(record, end)
-        heard.unlink()
+        remove(heard)
         if said:
             return evolve(outcome, reason=f"not recorded: {said}")
         return evolve(outcome, recorded=job.settings.record.at(height))
@@ -280,13 +286,14 @@ class Keeping:
 def keep(inbox: Connection) -> None:
     """The keeper's process: solve the jobs that come in, one by one, until the line ends.
 
-    It sends "" after each cell, or why the cell could not be written.
+    It sends "" after each cell, or why the cell could not be solved or stored.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # through `finally`: the child goes, too
     processes.lead_own_session()  # Ctrl-C is for the run, which then dismisses its keepers
-    with tempfile.TemporaryDirectory(prefix=f"matbench-{os.getpid()}-") as place:
-        keeping = Keeping(inbox, Path(place), confinement.is_possible(), ControlGroup.make())
+    with ExitStack() as places:
+        place = places.enter_context(temporary_folder())
+        keeping = Keeping(inbox, place, places, confinement.is_possible(), ControlGroup.make())
         try:
             while True:
                 job = inbox.recv()
@@ -296,7 +303,7 @@ def keep(inbox: Connection) -> None:
                 except (OSError, ValueError) as error:  # the disk is full, say
                     keeping.end_child()
                     said = str(error)
-                inbox.send(said)
+                inbox.send_bytes(said.encode("utf-8", "replace")[:_MOST_WORDS])
         except (EOFError, BrokenPipeError, ConnectionResetError, Dismissed):
             pass
         finally:
@@ -305,7 +312,7 @@ def keep(inbox: Connection) -> None:
                 keeping.group.remove()
 
 
-def _heard(child: Child, count: Count) -> bool:
+def _heard(child: Child, watch: Stopwatch) -> bool:
     """Take in what a child says; whether it has answered.
 
     Raises
@@ -327,74 +334,50 @@ def _heard(child: Child, count: Count) -> bool:
         if message.word == "done":
             child.is_fit = message.is_fit
             return True
-        now = disturbance.moment(child.pid)
-        if message.word == "begins" and count.begin is None:
-            count.begin = now
-        elif message.word == "ends" and count.begin is not None and count.end is None:
-            count.end = now
-        else:
-            raise ValueError(f"{message.word} twice")
+        watch.take(message.word)
         with suppress(OSError):
             child.line.send_bytes(b"")
     return False
 
 
-def _timed(outcome: Outcome, count: Count, threads: int) -> Outcome:
-    """An outcome with what its keeper has counted: seconds, processor seconds, memory, and what others took.
+def _empty(draft: Path) -> None:
+    """Remove all that lies in a cell's draft.
 
     Raises
     ------
-    ValueError
-        If the child has not let itself be timed.
+    OSError
+        If the draft is no folder any more, or something cannot be removed: then nothing is written there.
     """
-    if count.start is None or count.begin is None or count.end is None or outcome.seconds is None:
-        raise ValueError("it was not timed")
-    solve = disturbance.between(count.begin, count.end)
-    # the system counts coarsely: of a short solve, what others took while it was warmed up says more
-    looked = solve if solve.wall >= disturbance.SHORTEST else disturbance.between(count.start, count.end)
-    outcome = intake.corrected(outcome, solve.wall)
-    if not outcome.doubt and looked.is_disturbed(threads, cores()):
-        taken = looked.others + looked.stolen
-        when = "meanwhile" if looked is solve else f"in the {looked.wall:.2g} s of its warm-up and solve"
-        outcome = evolve(outcome, doubt=f"others took {taken:.2g} processor seconds {when}")
-    return evolve(
-        outcome,
-        peak_mb=max(outcome.peak_mb or 0.0, count.peak_mb),
-        processor_seconds=solve.own,
-        others_seconds=solve.others + solve.stolen,
-    )
-
-
-def _empty(draft: Path) -> None:
+    if not _is_folder(draft):
+        raise NotADirectoryError(ENOTDIR, "a method has replaced the folder", str(draft))
     for half in draft.iterdir():
-        if half.is_dir():
-            shutil.rmtree(half)
-        else:
-            half.unlink()
+        remove(half)
+    if any(draft.iterdir()):
+        raise OSError(ENOTEMPTY, "what a method has put there cannot be removed", str(draft))
 
 
-def _how_it_ended(status: int, log: Log, kills: int) -> Outcome:
-    """The outcome for a child that ended before it answered, by itself or by the system."""
-    code = os.waitstatus_to_exitcode(status)
-    if b"std::bad_alloc" in log:  # C++ that meets the memory limit aborts: only its message tells this from a crash
-        return Outcome("out-of-memory", reason="the method ended its process: std::bad_alloc")
-    if code == -signal.SIGKILL and memory.kills_for_memory() > kills:
-        return Outcome("out-of-memory", reason="the system ended the method's process: memory had run out")
-    if code >= 0:
-        return Outcome("crashed", reason=f"the method ended its process (exit status {code})")
-    name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-    words = {"SIGSEGV": "segmentation fault, ", "SIGABRT": "abort, ", "SIGFPE": "arithmetic, "}.get(name, "")
-    return Outcome("crashed", reason=f"the method's process was ended by a signal ({words}{name})")
+def _is_folder(path: Path) -> bool:
+    """Is it a folder, and no link to one?"""
+    return path.is_dir() and not path.is_symlink()
 
 
-def _print_stack(child: Child, log: Log) -> None:
-    """Have the child print its stack into the log: SIGABRT makes `faulthandler` do so.
+def _copied(ready: Path, size: int, views: Path, cell: Cell) -> bool:
+    """Copy a file of views; whether it is there now, and holds the cell's scene: methods may reach what lies ready."""
+    try:
+        with ready.open("rb") as file:
+            if file.seek(0, os.SEEK_END) != size:
+                return False
+            file.seek(0)
+            views.write_bytes(file.read(size))
+        scene = views_only.read_views(views)
+        return (scene.name, scene.digest) == (cell.scene, cell.scene_digest)
+    except Exception:  # whatever a method has put there: the scene is read anew
+        return False
 
-    Whoever reads the log then sees where the method hung, or what took the memory.
-    """
-    with suppress(ProcessLookupError):
-        os.kill(child.pid, signal.SIGABRT)
-    end = time.monotonic() + _STACK_SECONDS
-    while time.monotonic() < end and child.pid not in processes.reap():
-        wait([child.output], _TICK)
-        log.drain()
+
+def _known_by(path: Path) -> tuple[int, ...]:
+    """What a file is known by: a method that writes into it, or puts another there, changes that."""
+    with suppress(OSError):
+        facts = path.lstat()
+        return facts.st_mode, facts.st_dev, facts.st_ino, facts.st_size, facts.st_ctime_ns
+    return ()

@@ -7,8 +7,7 @@ The scenes are in `matbench.solving.check_scenes`, one solve in a process of its
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from matbench.plans import plugins
-from matbench.plans.plan import Method
+from matbench.plans.plan import Method, plugin_of
 from matbench.solving import processes
 from matbench.solving.check_scenes import trials
 from matbench.solving.check_solve import Answer, solve_apart
@@ -37,7 +36,7 @@ def check(
     -------
     One result for each check, always the same checks in the same order.
     """
-    entry = plugins.algorithm(method.algorithm, files).entry
+    entry = plugin_of(method, files).entry
     wanted, answers = trials(), {}
     module = [] if isinstance(entry, type) else [entry.module]
     with without_main(), kernel_cache_in_use():

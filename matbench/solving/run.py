@@ -2,18 +2,26 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from multiprocessing.connection import wait
+from types import MappingProxyType
 from typing import Any, Literal
 
 from attrs import evolve
 
+from matbench.files import temporary
 from matbench.plans import plugins
 from matbench.plans.plan import Cell, Plan
 from matbench.plans.settings import Settings
+from matbench.runs.cell_files import write_cell
 from matbench.runs.outcome import Outcome
-from matbench.runs.store import Store, write_cell
+from matbench.runs.store import Store
+from matbench.scene import Scene
+from matbench.solving import strays
+from matbench.solving.compile_ahead import compile_ahead, methods_to_compile
 from matbench.solving.environment import kernel_cache_in_use, without_main
-from matbench.solving.keeper import Keeper, dismiss
+from matbench.solving.keeper import LOOK, Keeper, dismiss
+from matbench.solving.ready_views import ReadyViews
 from matbench.solving.worker import Job
 
 Event = Literal["start", "done"]
@@ -27,6 +35,7 @@ def run(
     todo: Sequence[Cell],
     preload: Iterable[str] = (),
     listen: Listener | None = None,
+    scenes: Mapping[str, Scene] = MappingProxyType({}),
 ) -> None:
     """Compute cells of a plan.
 
@@ -43,6 +52,8 @@ def run(
         Modules to import once for all cells besides the harness, such as those of the methods.
     listen
         Called as each cell starts and ends.
+    scenes
+        Those that are in memory already, by name: their views are handed to the keepers, which read others themselves.
 
     Raises
     ------
@@ -58,13 +69,14 @@ def run(
             store.try_out()
             with store.building(cell) as draft:
                 write_cell(draft, cell, outcome)
-                (draft / "log.txt").touch()
         if outcome is not None:
             known[cell.key] = store.fingerprint(cell)
         told(event, cell, outcome)
 
     if not todo:
         return
+    strays.end_of_the_dead()
+    temporary.sweep()
     store.sweep()
     try:
         with without_main(), kernel_cache_in_use():
@@ -73,10 +85,11 @@ def run(
 
                 cluster.run_cells(plan, store, settings, todo, tell)
                 return
-            _run_here(plan, store, settings, preload, todo, tell)
+            compile_ahead(methods_to_compile(todo))
+            _run_here(plan, store, settings, preload, todo, tell, scenes)
             if settings.steady:
                 doubtful = [cell for cell in todo if (found := store.outcome(cell)) is not None and found.is_doubtful]
-                _run_here(plan, store, evolve(settings, jobs=1), preload, doubtful, tell)
+                _run_here(plan, store, evolve(settings, jobs=1), preload, doubtful, tell, scenes)
     finally:
         _refuse_changed(plan, store, known)
 
@@ -91,7 +104,6 @@ def _refuse_changed(plan: Plan, store: Store, known: Mapping[str, str]) -> None:
         if store.fingerprint(cell) != known[cell.key]:
             with store.building(cell) as draft:
                 write_cell(draft, cell, changed)
-                (draft / "log.txt").touch()
 
 
 def _dataset_modules(cells: Iterable[Cell]) -> list[str]:
@@ -103,7 +115,13 @@ def _dataset_modules(cells: Iterable[Cell]) -> list[str]:
 
 
 def _run_here(
-    plan: Plan, store: Store, settings: Settings, preload: Iterable[str], todo: Sequence[Cell], tell: Listener
+    plan: Plan,
+    store: Store,
+    settings: Settings,
+    preload: Iterable[str],
+    todo: Sequence[Cell],
+    tell: Listener,
+    scenes: Mapping[str, Scene],
 ) -> None:
     """Solve cells on this machine, as many at once as the settings say."""
     jobs = [
@@ -115,21 +133,28 @@ def _run_here(
     # a keeper lives through many cells: starting one takes longer than solving a small scene
     free: list[Keeper] = []
     busy: dict[Any, tuple[Keeper, Job]] = {}
+    places = ExitStack()
     try:
+        ready = ReadyViews(places.enter_context(temporary.temporary_folder()), scenes, todo)
         free += [Keeper(preload) for _ in range(min(settings.jobs, len(jobs)))]
         while waiting or busy:
             while waiting and free:
                 keeper, job = free.pop(), waiting.popleft()
+                job = evolve(job, views=ready.of(job.cell))
                 busy[keeper.line] = keeper, job
                 keeper.begin(job)
                 tell("start", job.cell, None)
-            for line in wait(list(busy)):
-                keeper, job = busy[line]
+            heard = wait(list(busy), LOOK)
+            for line, (keeper, job) in list(busy.items()):
+                if line not in heard and not keeper.is_lost():
+                    continue
                 outcome, lives = keeper.outcome(job)
                 if not lives:  # it was killed itself, by the system for want of memory, say
                     dismiss([keeper])
                 del busy[line]
                 free.append(keeper if lives else Keeper(preload))
+                ready.done(job.cell)
                 tell("done", job.cell, outcome)
     finally:
         dismiss([*free, *(keeper for keeper, _ in busy.values())])
+        places.close()

@@ -26,14 +26,17 @@ from numpy.typing import NDArray
 
 from matbench.algorithm import Algorithm, Context, Estimate, unsupported
 from matbench.errors import UserError, failure, one_line
+from matbench.files.arrays import write_arrays
 from matbench.measures.volumes import StoredVolume
 from matbench.plans import plugins
-from matbench.plans.plan import Cell
+from matbench.plans.plan import Cell, plugin_of
 from matbench.plans.settings import Settings
-from matbench.runs.outcome import FINAL, Outcome, Status
+from matbench.runs.cell_files import CONFIDENCE
+from matbench.runs.outcome import DEVICE, FINAL, Outcome, Status
 from matbench.scene import Scene
 from matbench.scenes import views_only
-from matbench.solving import memory, processes
+from matbench.solving import confinement, memory, processes
+from matbench.solving.returned import checked_confidence, checked_maps, checked_volume, device_cost
 
 _TINY = 16, 64  # rows and columns of the scene for the first, untimed solve, which compiles the kernels
 OUTCOME, MAPS, VOLUME, TOLD = "outcome.json", "disparity.npz", "volume.npz", "told.npz"
@@ -54,6 +57,9 @@ class Job:
         How many threads the method may use.
     alone
         Is it the only cell of the run that is solved at this time? Else its seconds do not compare.
+    views
+        A file with the views of its scene and its size in bytes, if the run has it ready
+        (`matbench.solving.ready_views`).
     """
 
     run: Path
@@ -62,6 +68,7 @@ class Job:
     threads: int
     settings: Settings
     alone: bool = True
+    views: tuple[Path, int] | None = None
 
 
 @frozen
@@ -117,6 +124,7 @@ class Answer:
     outcome: Outcome
     maps: dict[int, NDArray[np.float32]] = field(factory=dict)
     volume: StoredVolume | None = None
+    confidence: dict[int, NDArray[np.float32]] = field(factory=dict)
 
 
 def like(scene: Scene, size: tuple[int, int]) -> Scene:
@@ -126,32 +134,6 @@ def like(scene: Scene, size: tuple[int, int]) -> Scene:
     """
     views = np.random.default_rng(0).integers(0, 256, (scene.n, *size, 3), np.uint8)
     return evolve(views_only.without_truth(scene), views=views)
-
-
-def checked(estimate: Any, scene: Scene) -> dict[int, NDArray[np.float32]]:
-    """The disparity maps of an estimate as float32; what is masked or infinite becomes NaN: no answer.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the method returned anything but an `Estimate` with maps of the scene's size.
-    """
-    if not isinstance(estimate, Estimate):
-        raise TypeError(f"solve returned {type(estimate).__name__}, not an Estimate")
-    if scene.ref not in estimate.disparity:
-        raise ValueError(f"the estimate has no disparity map of the reference view {scene.ref}")
-    maps = {}
-    for view, values in estimate.disparity.items():
-        if not isinstance(view, int | np.integer) or isinstance(view, bool) or not 0 <= view < scene.n:
-            raise ValueError(f"the estimate has a map of view {view!r}, the scene has the views 0 to {scene.n - 1}")
-        array = np.asanyarray(values)  # `asarray` would forget a mask
-        if array.shape != (scene.height, scene.width) or array.dtype.kind not in "fiu":
-            expected = f"{(scene.height, scene.width)} numbers"
-            raise ValueError(f"the map of view {view} is {array.shape} {array.dtype}, not {expected}")
-        with np.errstate(over="ignore"):  # too large for float32 is infinite
-            single = np.ma.filled(np.ma.asarray(array, np.float32), np.float32(np.nan))
-        maps[int(view)] = np.where(np.isfinite(single), single, np.float32(np.nan))
-    return maps
 
 
 def _reset_peak() -> None:
@@ -167,20 +149,6 @@ def _peak_mb() -> float:
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) / 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
-def _volume(estimate: Estimate, scene: Scene) -> StoredVolume | None:
-    """The estimate's volume as it is stored; None if it has none, or one that cannot be stored: the log says why."""
-    if estimate.volume is None:
-        return None
-    try:
-        volume = StoredVolume.of(estimate.volume)
-        if volume.views[-1] >= scene.n or (volume.space.rows, volume.space.width) != (scene.height, scene.width):
-            raise ValueError(f"the volume spans the views {volume.views} of {volume.space}, which is another scene")
-    except (ValueError, TypeError, AttributeError) as error:
-        print(f"volume not kept: {failure(error)}")
-        return None
-    return volume
 
 
 def _warm_up(method: Algorithm, scene: Scene, context: Context) -> Estimate:
@@ -208,13 +176,17 @@ def _solve(method: Algorithm, scene: Scene, job: Job, keeper: KeeperLine) -> Ans
     seconds = perf_counter() - begin
     peak = _peak_mb()
     keeper.say_and_wait("ends")
-    maps = checked(estimate, scene)
+    maps = checked_maps(estimate, scene)
     history = {name: [v if isfinite(v) else None for v in map(float, vs)] for name, vs in estimate.history.items()}
     work = {name: int(count) for name, count in estimate.work.items()}
-    volume = _volume(estimate, scene) if job.settings.volumes else None
+    volume = checked_volume(estimate, scene) if job.settings.volumes else None
     has_volume = volume is not None if job.settings.volumes else getattr(warm, "volume", None) is not None
     outcome = Outcome("ok", seconds, warmed - start, peak, job.threads, "", has_volume, work, history, alone=job.alone)
-    return Answer(outcome, maps, volume)
+    device_seconds, device_mb = (device_cost(estimate, name) for name in DEVICE)
+    outcome = evolve(outcome, device_seconds=device_seconds, device_mb=device_mb)
+    if estimate.seconds != "measured":
+        outcome = evolve(outcome, seconds=estimate.seconds, warmup_seconds=None, peak_mb=None, elsewhere=True)
+    return Answer(outcome, maps, volume, checked_confidence(estimate, scene))
 
 
 def _listen(method: Algorithm, scene: Scene, job: Job, path: Path) -> str:
@@ -226,7 +198,7 @@ def _listen(method: Algorithm, scene: Scene, job: Job, path: Path) -> str:
     try:
         probe = CapturingProbe(job.settings.record.at(scene.height))
         estimate = method.solve(scene, Context(job.cell.seed, job.threads, probe))
-        plain = Estimate(checked(estimate, scene), estimate.volume)  # the harness's own types only
+        plain = Estimate(checked_maps(estimate, scene), estimate.volume)  # the harness's own types only
         told.write_told(path, told.Told(probe, plain))
     except Exception as error:
         traceback.print_exc()
@@ -234,22 +206,32 @@ def _listen(method: Algorithm, scene: Scene, job: Job, path: Path) -> str:
     return ""
 
 
-def run_cell(order: Order, keeper: KeeperLine) -> Outcome:
-    """Solve a cell and fill the folder of its answer, whatever the method raises."""
-    job, process, place = order.job, os.getpid(), Path.cwd()
+def run_cell(order: Order, keeper: KeeperLine, unready: Exception | None = None) -> Outcome:
+    """Solve a cell and fill the folder of its answer, whatever the method raises.
+
+    Parameters
+    ----------
+    unready
+        What went wrong before: then no method runs, and that is the cell's reason.
+    """
+    job, process, place = order.job, os.getpid(), _working_folder()
     cell, answer = job.cell, Answer(Outcome("failed"))
     try:
-        plugin = plugins.algorithm(cell.method.algorithm, [Path(file) for file in job.plugin_files])
+        if unready is not None:
+            raise unready
+        plugin = plugin_of(cell.method, [Path(file) for file in job.plugin_files])
         method = plugin.make(cell.method.params)
         # files may have been edited since the plan was made: results must not stand under the old digest
         if plugins.method_digest(plugin, method) != cell.method.code:
             raise UserError(f"the code of {cell.method.algorithm} is not what it was when the run was planned")
         scene = views_only.read_views(order.views)
+        if plugins.scene_files(method, scene) != cell.files:
+            raise UserError(f"the files that {cell.method.algorithm} reads for this scene have changed meanwhile")
         answer = _solve(method, scene, job, keeper)
         # `evolve` makes a scene whose digest is not cached: it is computed from the pixels as they are now
         if evolve(scene).digest != cell.scene_digest:
             raise ValueError("the method wrote into its input")
-        os.chdir(place)
+        _return_to(place)
         if job.settings.record is not None and not cell.repeat and answer.outcome.status == "ok":
             reason = _listen(method, scene, job, order.answer / TOLD)
             answer = evolve(answer, outcome=evolve(answer.outcome, reason=reason))
@@ -260,17 +242,33 @@ def run_cell(order: Order, keeper: KeeperLine) -> Outcome:
         status, reason = _what_failed(error)
         answer = Answer(Outcome(status, threads=job.threads, reason=reason, alone=job.alone))
     finally:
-        os.chdir(place)
+        _return_to(place)
     _write(answer, order.answer)
     return answer.outcome
+
+
+def _working_folder() -> Path:
+    """Where relative paths lead; the root where that folder has been deleted."""
+    with suppress(FileNotFoundError):
+        return Path.cwd()
+    return Path("/")
+
+
+def _return_to(folder: Path) -> None:
+    """Undo what a method has done to the working folder."""
+    try:
+        os.chdir(folder)
+    except FileNotFoundError:
+        os.chdir("/")
 
 
 def _write(answer: Answer, folder: Path) -> None:
     if answer.volume is not None:
         answer.volume.write(folder / VOLUME)
-    if answer.maps:
-        arrays: dict[str, Any] = {f"view_{view}": values for view, values in answer.maps.items()}
-        np.savez_compressed(folder / MAPS, **arrays)
+    for name, maps in ((MAPS, answer.maps), (CONFIDENCE, answer.confidence)):
+        if maps:
+            arrays: dict[str, Any] = {f"view_{view}": values for view, values in maps.items()}
+            write_arrays(folder / name, arrays)
     (folder / OUTCOME).write_text(json.dumps(_json.unstructure(answer.outcome), allow_nan=False), encoding="utf-8")
 
 
@@ -285,38 +283,48 @@ def _what_failed(error: BaseException) -> tuple[Status, str]:
     return "out-of-memory" if is_memory else "failed", reason
 
 
-def serve(line: Connection, printed: int, job: Job) -> None:
-    """The child process: solve the cells that come in (`Order`), one by one, telling the keeper (`Message`).
-
-    Never returns.
-
-    Parameters
-    ----------
-    printed
-        The file descriptor that receives everything this process prints, from Python or from C.
-    job
-        The first cell's job: its settings give the limits of this process.
-    """
-    # the keeper's handlers are inherited and are not for methods
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    os.dup2(printed, 1)  # descriptors 1 and 2, not only sys.stdout: C and Fortran print there
-    os.dup2(printed, 2)
-    os.close(printed)
+def print_to(descriptor: int) -> None:
+    """Have everything that this process prints from now on, from Python or from C, go to a file descriptor."""
+    os.dup2(descriptor, 1)  # descriptors 1 and 2, not only sys.stdout: C and Fortran print there
+    os.dup2(descriptor, 2)
+    os.close(descriptor)
     sys.stdout, sys.stderr = (
         open(number, "w", encoding="utf-8", errors="replace", buffering=1, closefd=False)  # noqa: SIM115
         for number in (1, 2)
     )
-    faulthandler.enable(file=2)
-    memory.confine(job.settings.memory_each())
-    processes.use_threads(job.threads)
+
+
+def serve(line: Connection, job: Job, confined: bool) -> None:
+    """The child process: solve the cells that come in (`Order`), one by one, telling the keeper (`Message`).
+
+    Never returns. What goes wrong before the method starts becomes the cell's reason, and stands in its log.
+
+    Parameters
+    ----------
+    job
+        The first cell's job: its settings give the limits of this process.
+    confined
+        Shut it in first (`matbench.solving.confinement`)?
+    """
+    unready = None
+    try:
+        # the keeper's handlers are inherited and are not for methods
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        if confined:
+            confinement.shut_in(job.run, job.settings.memory_each())
+        faulthandler.enable(file=2)
+        memory.confine(job.settings.memory_each())
+        processes.use_threads(job.threads)
+    except Exception as error:
+        unready = error
     os.environ[views_only.VARIABLE] = "1"
     keeper, environment = KeeperLine(line), dict(os.environ)
     with suppress(EOFError, OSError):
         while True:
             order = line.recv()
             try:
-                message = Message("done", is_fit=run_cell(order, keeper).status in FINAL)
+                message = Message("done", is_fit=run_cell(order, keeper, unready).status in FINAL)
             except OSError as error:
                 message = Message("lost", f"{type(error).__name__}: {error}")
             _flush()

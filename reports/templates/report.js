@@ -96,11 +96,12 @@
     const other = reference.value || best(metric, region.value);
     const at = data.methods.indexOf(other);
     const turn = (v) => (v === null ? null : -v);
+    const turnVerdict = (said) => ({ lower: "higher", higher: "lower" })[said] ?? said;
     const turned = (value, shown) => (value === 0 ? shown : turnText(shown));
     const rows = data.differences[metric][region.value].flatMap(([method, from, mean, low, high, scenes, ...shown]) => {
       if (from === at) return [{ method, mean, low, high, scenes, shown }];
       if (method !== at) return [];
-      const back = [turned(mean, shown[0]), turned(high, shown[2]), turned(low, shown[1]), turned(mean, shown[3])];
+      const back = [turned(mean, shown[0]), turned(high, shown[2]), turned(low, shown[1]), turned(mean, shown[3]), turnVerdict(shown[4])];
       return [{ method: from, mean: turn(mean), low: turn(high), high: turn(low), scenes, shown: back }];
     });
     const aside = asideOf(metric, region.value);
@@ -108,12 +109,11 @@
     const ends = [0, ...rows.flatMap((r) => [r.mean ?? 0, r.low ?? 0, r.high ?? 0])];
     const [least, most] = [Math.min(...ends), Math.max(...ends)];
     const place = (value) => String(3 + (94 * ((value ?? 0) - least)) / (most - least || 1));
-    const better = data.better[metric] === "higher" ? 1 : -1;
+    const higher = data.better[metric] === "higher";
     const verdict = (r) => {
       if (aside.includes(other) || aside.includes(data.methods[r.method])) return data.silent;
-      if (r.scenes < data.few) return "too few scenes";
-      if (!(r.low > 0 || r.high < 0)) return "undecided";
-      return r.mean * better > 0 ? "better" : "worse";
+      if (!["lower", "higher"].includes(r.shown[4])) return r.shown[4];
+      return (r.shown[4] === "higher") === higher ? "better" : "worse";
     };
     $("#reference-name").textContent = other;
     table.tBodies[0].replaceChildren(

@@ -1,7 +1,6 @@
 """Other people's programs: honest, failing, hanging and lying ones."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -12,8 +11,11 @@ import numpy as np
 import psutil
 import pytest
 from places import PROGRAMS
+from rigs import uneven
+from tools import need
 
 from matbench import Context, Range, Scene
+from matbench.algorithm import unsupported
 from matbench.algorithms.command import Command
 from matbench.comparison import prepare
 from matbench.errors import UserError
@@ -43,6 +45,9 @@ LIES = {
     ),
     "is a folder": ("(Path(out) / 'disp0.pfm').mkdir()", "wrote no disp0.pfm"),
 }
+
+
+SWEEP = (PROGRAMS / "plane_sweep.py").read_text()
 
 
 def program(path: Path, source: str) -> str:
@@ -99,9 +104,7 @@ def test_a_shifted_range_gives_the_exact_disparity_up_to_the_frame(matcher: str,
 
 
 def test_a_c_program_competes_behind_a_run_script(tmp_path: Path, box: Scene) -> None:
-    compiler = shutil.which("gcc") or shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler")
+    (compiler,) = need("compiler")
     binary = tmp_path / "matcher"
     subprocess.run([compiler, "-O2", PROGRAMS / "block_matcher.c", "-lm", "-o", binary], check=True)
     run = program(tmp_path / "run", (PROGRAMS / "run_c.py").read_text())
@@ -165,6 +168,7 @@ def test_what_cannot_be_started_is_refused_in_one_line(tmp_path: Path, matcher: 
         ("command[program=./none]", "'./none' does not exist"),
         (f"command[program={plain}]", "chmod +x"),
         (f"command[program={tmp_path}]", "no executable file"),
+        (f"command[program='{matcher}' files=\"a'\"]", "cannot be split into words"),
         (f"command[program='{matcher}' args='-v']", "lack {left}, {right}, {out}"),
         (f"command[program='{matcher}' files=none.so]", "'none.so' cannot be read"),
     ]:
@@ -252,3 +256,102 @@ def test_cells_of_programs_good_and_bad_and_a_changed_program_is_another_cell(tm
 
     Path(matcher).write_text(Path(matcher).read_text().replace("found[::-1]", "(0 * found[::-1])"))
     assert cells()[good][1] > 20
+
+
+def sweep(layout: str, kind: str = "depth") -> str:
+    return f"{layout} {{{layout}}} {{ref}} {{near}} {{far}} {{out}} {kind}"
+
+
+@pytest.mark.parametrize(
+    ("layout", "kind"), [*((one, "depth") for one in ("json", "colmap", "pmvs", "mvsnet")), ("json", "disp")]
+)
+def test_a_program_of_all_views_gets_right_cameras_in_every_layout(layout: str, kind: str, tmp_path: Path) -> None:
+    method = Command(program(tmp_path / "sweep", SWEEP), args=sweep(layout, kind))
+    full = load_scene("synthetic/box[n=6 ref=2 size=96x72]")
+    for scene in (full, uneven(full, (0, 2, 5), 2), load_scene("synthetic/curved[n=5 ref=1 size=96x72]")):
+        assert not unsupported(method, scene)
+        found = method.solve(scene, Context()).disparity[scene.ref]
+        assert bad(scene, found) < 14, scene.name  # 40 planes of depth, in windows
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("", "has not one of disp, depth, as pfm, npy, npz, tif, tiff: nothing"),
+        ("np.save(out / 'disp.npy', zero); np.save(out / 'depth.npy', zero)", "depth.npy, disp.npy"),
+        ("np.save(out / 'disp.npy', zero[1:])", "is 240x179 px, not 240x180 as its view"),
+        ("(out / 'depth.pfm').write_text('P5')", "a PFM header is 'Pf'"),
+        ("np.save(out / 'depth.npy', np.array([{}], dtype=object))", "cannot be read"),
+    ],
+)
+def test_what_a_program_of_all_views_leaves_is_told(source: str, said: str, tmp_path: Path, box: Scene) -> None:
+    head = "import sys\nfrom pathlib import Path\nimport numpy as np\n"
+    head += "out, zero = Path(sys.argv[2]), np.zeros((180, 240))\n"
+    method = Command(program(tmp_path / "liar", head + source), args="{views} {out}")
+    with pytest.raises((UserError, RuntimeError)) as error:
+        method.solve(box, Context())
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_depths_that_are_none_are_no_answer(tmp_path: Path) -> None:
+    source = (
+        "import sys\nimport numpy as np\n"
+        "np.save(sys.argv[2] + '/depth.npy', np.array([[0, -1, np.inf], [np.nan, 1, 2]], np.float32))"
+    )
+    scene = Scene("six", np.zeros((3, 2, 3, 3), np.uint8), ("0", "1", "2"), 0, Range(1, 3), {}, 2)
+    found = Command(program(tmp_path / "sparse", source), args="{json} {out}").solve(scene, Context()).disparity[0]
+    np.testing.assert_array_equal(found, np.array([[np.nan] * 3, [np.nan, 3, 1.5]], np.float32))
+
+
+def test_a_link_is_called_by_its_own_name(tmp_path: Path, box: Scene) -> None:
+    """As a virtual environment's python is one, which finds its packages by the name."""
+    target = program(tmp_path / "target", f"import sys\nprint('called', sys.argv[0])\n{MATCHER}")
+    link = tmp_path / "link"
+    link.symlink_to(target)
+    shell = tmp_path / "shell"
+    shell.write_text('#!/bin/sh\necho "called $0"\nexit 3\n')
+    shell.chmod(0o755)
+    named = tmp_path / "named"
+    named.symlink_to(shell)
+    with pytest.raises(RuntimeError, match=f"called {named}"):
+        Command(str(named)).solve(box, Context())
+    assert bad(box, Command(str(link)).solve(box, Context()).disparity[1]) < 5
+
+
+def test_the_python_of_a_virtual_environment_finds_its_packages(tmp_path: Path, box: Scene) -> None:
+    """matbench's own stands in one where it is tried."""
+    script = tmp_path / "match.py"
+    script.write_text(f"import sys\nassert sys.prefix == {sys.prefix!r}, sys.prefix\n{MATCHER}")
+    method = Command(sys.executable, args=f"{script} {{left}} {{right}} {{ndisp}} {{out}}")
+    assert bad(box, method.solve(box, Context()).disparity[1]) < 5
+
+
+def test_relative_files_are_those_of_the_user_and_the_program_works_elsewhere(
+    tmp_path: Path, box: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "user").mkdir()
+    monkeypatch.chdir(tmp_path / "user")
+    (tmp_path / "user" / "weights.txt").write_text("7")
+    extra = "import os, sys\nassert open(sys.argv[5]).read() == '7'\nassert not os.listdir()\nopen('left over', 'w')\n"
+    program(tmp_path / "user" / "mine", extra + MATCHER)
+    method = Command("./mine", args="{left} {right} {ndisp} {out} weights.txt")
+    assert bad(box, method.solve(box, Context()).disparity[1]) < 5
+    assert sorted(path.name for path in Path.cwd().iterdir()) == ["mine", "weights.txt"]
+    assert Path("weights.txt") in method.reads
+
+    chosen = "command[program=./mine args='{left} {right} {ndisp} {out} weights.txt']"
+    (before,) = methods(chosen)
+    Path("weights.txt").write_text("8")
+    (after,) = methods(chosen)
+    assert before.code != after.code, "what arguments name counts by its content"
+
+
+def test_the_check_catches_a_map_that_is_upside_down(tmp_path: Path, matcher: str) -> None:
+    turned = MATCHER.replace("found[::-1]", "found")
+    assert turned != MATCHER
+    (method,) = methods(f"command[program='{program(tmp_path / 'turned', turned)}']")
+    found = {finding.check: finding for finding in check(method)}
+    assert found["sense"].verdict == "fail"
+    assert "upside down" in found["sense"].reason
+    assert {finding.verdict for finding in found.values() if finding.check != "sense"} == {"pass", "note"}

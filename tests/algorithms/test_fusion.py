@@ -41,13 +41,13 @@ def both_see(matcher):
 def supported(cost, image, radius, adaptive):
     """sum w cost / sum w over the window within the image, w = exp(-largest colour difference / adaptive)."""
     out = np.empty(cost.shape)
-    height, width, _ = cost.shape
+    height, _, width = cost.shape
     for y, x in np.ndindex(height, width):
         rows = slice(max(0, y - radius), y + radius + 1)
         columns = slice(max(0, x - radius), x + radius + 1)
         gap = np.abs(image[rows, columns].astype(float) - image[y, x]).max(axis=2)
         weight = np.exp(-gap / adaptive)
-        out[y, x] = (weight[..., None] * cost[rows, columns]).sum(axis=(0, 1)) / weight.sum()
+        out[y, :, x] = (weight[:, None] * cost[rows, :, columns]).sum(axis=(0, 2)) / weight.sum()
     return out
 
 
@@ -68,16 +68,16 @@ def seen(matcher, maps, view, j, k, x):
 def seen_cost_twin(matcher, maps, hidden, window):
     space, view = matcher.space, matcher.scene.ref
     rho = matcher.rays(matcher.phases(), 0, space.rows, window) / 255
-    cost, mu = np.empty((2, space.rows, space.width, space.planes))
-    for x, k in np.ndindex(cost.shape[1:]):
+    cost, mu = np.empty((2, space.rows, space.planes, space.width))
+    for k, x in np.ndindex(cost.shape[1:]):
         rays = [seen(matcher, maps, view, j, k, x) for j in range(space.views)]
         total, weight = 0.5 * hidden, 0.5
         for p, (i, j) in enumerate(matcher.pairs):
             both = rays[i][0] * rays[j][0]
             total, weight = total + both * (1 - rho[:, p, k, x]), weight + both
-        cost[:, x, k] = total / weight
+        cost[:, k, x] = total / weight
         others = [ray for j, ray in enumerate(rays) if j != view]
-        mu[:, x, k] = (sum(w for _, w in others) + 0.05) / (sum(v for v, _ in others) + 0.5)
+        mu[:, k, x] = (sum(w for _, w in others) + 0.05) / (sum(v for v, _ in others) + 0.5)
     return cost, mu
 
 
@@ -123,11 +123,11 @@ def test_first_cost_is_one_less_the_better_half(
 
     if adaptive:
         rays = matcher.rays(matcher.phases(), 0, space.rows, 1)
-    expected = np.full((space.rows, space.width, space.planes), 0.6)
-    for y, x, k in np.ndindex(expected.shape):
+    expected = np.full((space.rows, space.planes, space.width), 0.6)
+    for y, k, x in np.ndindex(expected.shape):
         ranked = np.sort(rays[y, known[:, k, x], k, x] / 255)[::-1]
         if ranked.size:
-            expected[y, x, k] = 1 - np.mean(ranked[: (ranked.size + 1) // 2])
+            expected[y, k, x] = 1 - np.mean(ranked[: (ranked.size + 1) // 2])
     if adaptive:
         expected = supported(expected, matcher.scene.views[view], window // 2, adaptive)
     one, two = (Fusion(adaptive=adaptive, hidden=0.6).first_cost(matcher, threads) for threads in (1, 2))
@@ -160,14 +160,14 @@ def test_seen_cost_is_its_equation(n, height, width, least, extent, fineness, wh
 
 @settings(max_examples=20, deadline=None)
 @given(
-    shape=st.tuples(st.integers(1, 6), st.integers(1, 6), st.integers(1, 4)),
+    shape=st.tuples(st.integers(1, 6), st.integers(1, 4), st.integers(1, 6)),
     radius=st.integers(0, 2),
     adaptive=st.sampled_from([2.0, 30.0, 1e6]),
     seed=st.integers(0, 999),
 )
 def test_support_is_a_weighted_mean_of_the_window(shape, radius, adaptive, seed):
     rng = np.random.default_rng(seed)
-    cost, image = rng.random(shape, np.float32), rng.integers(0, 256, (*shape[:2], 3), dtype=np.uint8)
+    cost, image = rng.random(shape, np.float32), rng.integers(0, 256, (*shape[::2], 3), dtype=np.uint8)
     fall = np.exp(-np.arange(256) / adaptive).astype(np.float32)
     expected = supported(cost, image, radius, adaptive)
     first = int(rng.integers(shape[0]))
@@ -181,7 +181,7 @@ def test_support_is_a_weighted_mean_of_the_window(shape, radius, adaptive, seed)
 def test_support_stays_on_its_side_of_an_edge():
     image = np.zeros((5, 8, 3), np.uint8)
     image[:, 4:, 1] = 200
-    cost = np.broadcast_to((np.arange(8) >= 4)[:, None], (5, 8, 1)).astype(np.float32)
+    cost = np.broadcast_to(np.arange(8) >= 4, (5, 1, 8)).astype(np.float32)
     fall = np.exp(-np.arange(256) / 10).astype(np.float32)
     out = np.empty_like(cost)
     support(cost, image, 0, 0, fall, 2, out)
@@ -195,11 +195,11 @@ def test_a_view_that_ends_before_a_point_says_nothing_about_it():
     near = far + 4
     cost, mu = fusion.seen_cost(matcher, near)
     # two planes behind and farther nothing is seen, at the next everything
-    np.testing.assert_allclose(cost[..., :3], 0.4, atol=1e-6)
-    np.testing.assert_allclose(mu[..., :3], 0.1, atol=1e-6)
+    np.testing.assert_allclose(cost[:, :3], 0.4, atol=1e-6)
+    np.testing.assert_allclose(mu[:, :3], 0.1, atol=1e-6)
     assert mu[:, 4, 4] == pytest.approx((2 + 0.05) / (2 + 0.5))
-    assert mu[:, 4, 3] == pytest.approx(0.05 / 2.5)
-    np.testing.assert_array_equal(cost[:, 4, 3:], fusion.seen_cost(matcher, far)[0][:, 4, 3:])
+    assert mu[:, 3, 4] == pytest.approx(0.05 / 2.5)
+    np.testing.assert_array_equal(cost[:, 3:, 4], fusion.seen_cost(matcher, far)[0][:, 3:, 4])
 
 
 @pytest.mark.parametrize("view", [0, 3])

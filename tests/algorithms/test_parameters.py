@@ -1,9 +1,9 @@
-"""Validators that several methods share."""
+"""What several methods share for their parameters."""
 
 import pytest
 from attrs import field, frozen
 
-from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel
+from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel, unread
 
 
 @frozen
@@ -26,3 +26,8 @@ def test_bounds_are_part_of_it_and_the_message_says_them(name, good, bad, said):
     for value in bad:
         with pytest.raises(ValueError, match=f"^{name} is {value}; {said}$"):
             Given(**{name: value})
+
+
+def test_only_what_is_not_read_is_told():
+    takes = {"sigma": (False, "similarity=ssd"), "alike": (True, "similarity=census")}
+    assert unread(takes) == {"sigma": "similarity=ssd"}

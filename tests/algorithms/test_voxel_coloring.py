@@ -5,12 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from matbench.algorithm import Context
 from matbench.algorithms.sampling import fine_rows, search_space
-from matbench.algorithms.voxel_coloring import VoxelColoring
+from matbench.algorithms.voxel_coloring import SpaceCarving, VoxelColoring, carve
+from matbench.parameters import silent_in
 from matbench.scene import Range, Scene
-from matbench.space import visibility
+from matbench.space import DisparitySpace, visibility
 
 
 def scene_of(views: NDArray[np.uint8], least: float, largest: float, ref: int = 0, pair_steps: float = 1) -> Scene:
@@ -55,6 +57,8 @@ def slow(scene: Scene, method: VoxelColoring) -> tuple[NDArray[np.float32], NDAr
         for y in range(space.rows):
             for column in range(space.columns):
                 if len(unmarked(y, column, plane)) < 2:
+                    held = any(0 <= column - space.start(i, plane) < space.samples for i in range(space.views))
+                    occupied[y, plane, column] = held and method.unseen == "keep"
                     continue
                 tested += 1
                 squares = freedom = 0.0
@@ -66,7 +70,11 @@ def slow(scene: Scene, method: VoxelColoring) -> tuple[NDArray[np.float32], NDAr
                                 colours = np.array([images[i, :, y + dy, u] for i, u in seen])
                                 squares += ((colours - colours.mean(axis=0)) ** 2).sum()
                                 freedom += 3 * (len(seen) - 1)
-                occupied[y, plane, column] = np.sqrt(squares / freedom) <= method.threshold
+                if method.rule == "threshold":
+                    occupied[y, plane, column] = np.sqrt(squares / freedom) <= method.threshold
+                else:
+                    likely = chi2.cdf(squares / method.noise**2, freedom)
+                    occupied[y, plane, column] = likely <= 1 - method.significance
         for y, column in zip(*np.nonzero(occupied[:, plane]), strict=True):
             for i, u in unmarked(y, column, plane):
                 marked[i, y, u] = True
@@ -82,15 +90,21 @@ def slow(scene: Scene, method: VoxelColoring) -> tuple[NDArray[np.float32], NDAr
     width=st.integers(1, 6),
     least=st.integers(-2, 1),
     planes=st.integers(0, 2),
-    fineness=st.integers(1, 3),
-    window=st.sampled_from([1, 3]),
+    method=st.builds(
+        VoxelColoring,
+        fineness=st.integers(1, 3),
+        window=st.sampled_from([1, 3]),
+        rule=st.sampled_from(["threshold", "chi_squared"]),
+        unseen=st.sampled_from(["empty", "keep"]),
+        threshold=st.just(11.123),
+        noise=st.just(9.87),
+    ),
     seed=st.integers(0, 999),
 )
 def test_agrees_with_its_slow_twin(
-    n: int, rows: int, width: int, least: int, planes: int, fineness: int, window: int, seed: int
+    n: int, rows: int, width: int, least: int, planes: int, method: VoxelColoring, seed: int
 ) -> None:
     scene = scene_of(noise((n, rows, width, 3), seed, top=40), least, least + planes, ref=seed % n)
-    method = VoxelColoring(threshold=11.123, window=window, fineness=fineness)
     estimate = method.solve(scene, Context())
     disparity, occupied, tested = slow(scene, method)
     assert estimate.volume is not None
@@ -183,6 +197,104 @@ def test_threads_and_repetition_change_nothing() -> None:
         assert once.work == other.work
         assert 0 < once.volume.values.mean() < 1
     np.testing.assert_array_equal(scene.views, before)
+
+
+def rendered(seed: int, share: float) -> tuple[Scene, NDArray[np.float32]]:
+    """Views of random voxels, all of different colours, and the voxels; the farthest plane is full."""
+    space = DisparitySpace(3, 5, 14, 0, 4)
+    rng = np.random.default_rng(seed)
+    solid = (rng.random(space.shape) < share).astype(np.float32)
+    solid[:, 0] = 1
+    number = np.arange(solid.size).reshape(solid.shape)
+    colours = rng.permutation(256**3)[number]
+    ids = np.zeros((space.views, space.rows, space.width), np.int64)
+    for view in range(space.views):
+        for plane in range(space.planes):  # what is nearer comes later
+            ray = space.frustum(view, plane)
+            ids[view] = np.where(solid[:, plane, ray] > 0, colours[:, plane, ray], ids[view])
+    views = np.stack([ids >> 16, ids >> 8 & 255, ids & 255], axis=-1).astype(np.uint8)
+    return Scene("voxels", views, ("0", "1", "2"), 1, Range(0, 4), {}, 1), solid
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_hull_contains_what_the_views_show(seed: int, share: float) -> None:
+    scene, solid = rendered(seed, share)
+    hull = SpaceCarving(threshold=0, window=1).solve(scene, Context()).volume
+    assert hull is not None
+    held = np.zeros(hull.space.shape, bool)
+    for view, plane in np.ndindex(hull.space.views, hull.space.planes):
+        held[:, plane, hull.space.frustum(view, plane)] = True
+    assert (hull.values[held] >= solid[held]).all()
+    assert not hull.values[~held].any()
+    assert hull.values[held].mean() < 1  # something was carved
+    coloured = VoxelColoring(threshold=0, window=1).solve(scene, Context()).volume
+    assert coloured is not None
+    assert (coloured.values < solid).any()  # what one view only sees is lost there
+
+
+@pytest.mark.parametrize(("window", "threshold"), [(1, 0.0), (3, 8.0)])
+def test_a_second_sweep_changes_nothing(window: int, threshold: float) -> None:
+    scene = scene_of(noise((4, 8, 30, 3), 5, top=30), -1, 4, ref=1) if threshold else rendered(3, 0.2)[0]
+    space = search_space(scene)
+    limits = (threshold**2 * np.arange(9 * window**2 + 1)).astype(np.float32)
+    solid = np.ones(space.shape, np.float32)
+    first, _ = carve(scene, space, solid, window, limits, keep=True)
+    once = solid.copy()
+    again, _ = carve(scene, space, solid, window, limits, keep=True)
+    np.testing.assert_array_equal(solid, once)
+    np.testing.assert_array_equal(first, again)
+    assert 0 < once.mean() < 1
+
+
+def test_a_voxel_is_surer_the_better_its_colours_agree() -> None:
+    scene, least = rendered(3, 0.2)[0], 40.0
+    method = VoxelColoring(threshold=least, window=1, fill=False)
+    estimate = method.solve(scene, Context())
+    found, sure = estimate.disparity[scene.ref], estimate.confidence[scene.ref]
+    assert (sure[np.isnan(found)] == 0).all()
+    assert 0 <= sure.min() < sure.max() <= 1
+    # the nearest plane of all, where every view still sees everything: by hand
+    space = search_space(scene)
+    whole = [
+        (y, x)
+        for y, x in zip(*np.nonzero(found == space.disparities[-1]), strict=True)
+        if all(0 <= x - (j - scene.ref) * space.last < scene.width for j in range(scene.n)) and space.fineness == 1
+    ]
+    assert len(whole) >= 5
+    for y, x in whole:
+        colours = [scene.views[j, y, x - (j - scene.ref) * space.last].astype(float) for j in range(scene.n)]
+        squares = ((colours - np.mean(colours, axis=0)) ** 2).sum()
+        assert sure[y, x] == pytest.approx(1 - squares / (least**2 * 3 * (scene.n - 1)), abs=1e-4)
+
+
+def test_carving_is_colouring_that_keeps_what_is_unseen() -> None:
+    scene = scene_of(noise((4, 9, 30, 3), 5, top=30), -1, 4, ref=1)
+    carved, kept = SpaceCarving().solve(scene, Context()), VoxelColoring(unseen="keep").solve(scene, Context())
+    assert carved.volume is not None
+    assert kept.volume is not None
+    np.testing.assert_array_equal(carved.volume.values, kept.volume.values)
+    assert carved.work == kept.work
+
+
+@pytest.mark.parametrize("deviation", [2.0, 6.0])
+def test_noise_decides_by_itself_what_is_consistent(deviation: float) -> None:
+    texture = np.random.default_rng(1).integers(20, 236, (30, 60, 3)).repeat(2, axis=1)[:, :90]
+    clean = np.stack([texture[:, 2 * j : 2 * j + 60] for j in range(4)])
+    views = np.clip(np.rint(clean + np.random.default_rng(2).normal(0, deviation, clean.shape)), 0, 255).astype(
+        np.uint8
+    )
+    scene = scene_of(views, 2, 2, ref=1)
+    found = VoxelColoring(rule="chi_squared", window=1, significance=0.05, noise=deviation).solve(scene, Context())
+    turned_away = np.isnan(found.disparity[1]).mean()
+    assert 0.02 < turned_away < 0.1
+    strict = VoxelColoring(rule="chi_squared", window=1, noise=deviation / 3).solve(scene, Context())
+    assert np.isnan(strict.disparity[1]).mean() > 0.5
+
+
+def test_what_is_not_read_is_said() -> None:
+    assert set(silent_in(VoxelColoring())) == {"noise", "significance"}
+    assert set(silent_in(SpaceCarving(rule="chi_squared"))) == {"threshold"}
 
 
 @pytest.mark.parametrize("wrong", [{"threshold": -1}, {"window": 2}, {"views": 1}, {"fineness": -1}])

@@ -1,5 +1,6 @@
 """Ratios that are stored, and the verdicts on those measured later."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -127,6 +128,12 @@ def test_ratios_are_stored_for_a_kind_of_machine(tmp_path: Path) -> None:
     assert baselines.matching(tmp_path / "empty", KIND, "digest") == (None, "no baseline is stored")
     assert baselines.replaced(tmp_path, evolve(STORED, ratios={})) == STORED
     assert baselines.replaced(tmp_path, evolve(STORED, digest="another")) is None
+    for way in (os.mkfifo, lambda path: path.write_text("[" * 100_000), lambda path: path.symlink_to("/dev/zero")):
+        path.unlink()
+        way(path)
+        with pytest.raises(UserError, match="no stored baseline"):
+            baselines.read(tmp_path)
+    path.unlink()
     path.write_text("{", encoding="utf-8")
     assert baselines.replaced(tmp_path, STORED) is None  # and --update writes it anew
     with pytest.raises(UserError, match="no stored baseline"):

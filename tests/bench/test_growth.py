@@ -6,6 +6,7 @@ from subjects import METHODS, instance, scene
 
 from matbench.algorithm import Context
 from matbench.bench import growth
+from matbench.errors import UserError
 
 
 def test_exponents_are_those_of_powers() -> None:
@@ -15,7 +16,11 @@ def test_exponents_are_those_of_powers() -> None:
     assert low < slope < high
 
 
-@pytest.mark.parametrize("name", [n for n in METHODS if n not in ("okutomi_kanade", "sgbm")])
+# three hold no volume, and the graph of one is larger than its volumes
+NO_VOLUMES = ("collins_sweep", "kolmogorov_zabih", "okutomi_kanade", "sgbm")
+
+
+@pytest.mark.parametrize("name", [n for n in METHODS if n not in NO_VOLUMES])
 def test_counted_bytes_of_volumes_are_allocated(name: str) -> None:
     """The volumes that a method counts are most of what it holds at once."""
     import tracemalloc
@@ -29,3 +34,19 @@ def test_counted_bytes_of_volumes_are_allocated(name: str) -> None:
     finally:
         tracemalloc.stop()
     assert counted <= peak < 2 * counted
+
+
+def test_every_built_in_method_and_preset_can_grow() -> None:
+    """Nobody need remember a new one; all use every view and whole-pixel planes where they have such a choice."""
+    found = growth.methods()
+    assert list(found) == list(METHODS)
+    assert growth.PEER in found
+    shared = {name: growth.parameters.values_of(one) for name, one in found.items()}
+    assert {values["views"] for values in shared.values() if "views" in values} == {0}
+    assert {values["fineness"] for values in shared.values() if "fineness" in values} == {1}
+
+
+def test_only_chosen_methods_grow_beside_their_peer() -> None:
+    assert growth.chosen(["voxel*"]) == ["voxel_coloring", "sgbm"]
+    with pytest.raises(UserError, match="unknown method 'voxell'"):
+        growth.chosen(["voxell"])

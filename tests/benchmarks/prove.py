@@ -48,9 +48,8 @@ PLANTS = (
         "algorithms/semiglobal.py",
         (
             (
-                "    for row in range(height):\n        y = row if forward else height - 1 - row\n",
-                f"    for turn in {_again('height')}:\n        row = turn % height\n"
-                "        y = row if forward else height - 1 - row\n",
+                "    for row in range(rows):\n        y, y_old",
+                f"    for turn in {_again('rows')}:\n        row = turn % rows\n        y, y_old",
             ),
         ),
     ),
@@ -59,9 +58,8 @@ PLANTS = (
         "algorithms/semiglobal.py",
         (
             (
-                "    for y in range(height):\n        for x in range(width):\n            sums",
-                f"    for turn in {_again('height')}:\n        y = turn % height\n"
-                "        for x in range(width):\n            sums",
+                "    for y in range(height):\n        sums",
+                f"    for turn in {_again('height')}:\n        y = turn % height\n        sums",
             ),
         ),
     ),
@@ -70,9 +68,8 @@ PLANTS = (
         "algorithms/fusion.py",
         (
             (
-                "    for row in range(out.shape[0]):\n        for x in range(out.shape[1]):\n            _weights",
-                f"    for turn in {_again('out.shape[0]')}:\n        row = turn % out.shape[0]\n"
-                "        for x in range(out.shape[1]):\n            _weights",
+                "    for row in range(out.shape[0]):\n        _shares",
+                f"    for turn in {_again('out.shape[0]')}:\n        row = turn % out.shape[0]\n        _shares",
             ),
         ),
     ),

@@ -37,6 +37,6 @@ def test_an_ablation_from_the_command_line(tmp_path: Path) -> None:
         .set_index(["params", "region", "metric"])
         .value
     )
-    change = scores["value=3.0", "all", "avg"] - scores["", "all", "avg"]
+    change = scores["value=3.0", "all", "avg"] - scores["value=1.0", "all", "avg"]
     assert table.loc[(3.0, "all", "avg"), "change"] == pytest.approx(change)
     assert "What each switch does" in (tmp_path / "run" / "report.html").read_text()

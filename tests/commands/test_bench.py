@@ -16,6 +16,7 @@ from matbench.bench import base, baselines, machine
 from matbench.bench.baselines import Baseline
 from matbench.bench.measuring import Tree
 from matbench.cli import main
+from matbench.plans import kernels
 
 
 @pytest.mark.parametrize(
@@ -45,9 +46,11 @@ def test_what_cannot_be_is_refused_in_one_line(
 
 def _run(code: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """`matbench bench` of a copy of the checkout."""
+    # a folder of kernels that was handed on to this process would be used where the code is the same
+    inherited = {name: value for name, value in os.environ.items() if name != kernels.VARIABLE}
     cache = {"XDG_CACHE_HOME": str(code.parent / "cache")}
     command = [sys.executable, "-m", "matbench", "bench", *arguments]
-    return subprocess.run(command, cwd=code, env={**os.environ, **cache}, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=code, env={**inherited, **cache}, capture_output=True, text=True, check=False)
 
 
 def test_slow_downs_can_still_be_planted() -> None:
@@ -85,14 +88,14 @@ def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path)
     commit = str(base.last_change(code, path))
     killed = tmp_path / "cache" / "matbench" / "kernels" / commit / "code"
     subprocess.run(["git", "-C", code, "worktree", "add", "-q", "--detach", killed, commit], check=True)
-    kernels = code / "algorithms" / "voxel_coloring.py"
-    text = kernels.read_text(encoding="utf-8")
+    source = code / "algorithms" / "voxel_coloring.py"
+    text = source.read_text(encoding="utf-8")
     loop = "    for y in range(first, end):\n        number = sums[0, y]\n"
     assert text.count(loop) == 1
     twice = loop.replace(
         "y in range(first, end):\n", "turn in range(2 * (end - first)):\n        y = first + turn // 2\n"
     )
-    kernels.write_text(text.replace(loop, twice), encoding="utf-8")
+    source.write_text(text.replace(loop, twice), encoding="utf-8")
     slower = _run(code, *chosen, *judged)
     assert slower.returncode == 3, slower.stdout
     found = json.loads(slower.stdout)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from places import METHODS
+from real import Real
 from typing_commands import SMALL, run
 
 from matbench.cli import main
@@ -23,7 +24,7 @@ from matbench.cli import main
         (["-s", "synthetic/box[view=1]"], "unknown"),
         (["-s", "synthetic/no*"], "no scene 'synthetic/no*' exists"),
         (["-s", "box"], "scene 'box' has no dataset"),
-        (["-m", "bad_3"], "unknown metric 'bad_3'"),
+        (["-m", "bad_x"], "unknown metric 'bad_x'"),
         (["--data", "/no/such/folder"], "data folder '/no/such/folder' (--data) does not exist"),
         (["--plugin", "/no/such.py"], "plug-in file '/no/such.py' does not exist"),
         (["--seed=-1"], "seed '-1' is not a whole number"),
@@ -101,9 +102,9 @@ def test_missing_real_scenes_are_one_line(
 
 
 def test_a_truncated_image_is_found_before_anything_is_written(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, data_root: Path
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, real: Real
 ) -> None:
-    source = data_root / "middlebury/scenes2001/data/tsukuba"
+    source = real("middlebury2001/tsukuba") / "middlebury/scenes2001/data/tsukuba"
     place = tmp_path / "data/middlebury/scenes2001/data/tsukuba"
     place.mkdir(parents=True)
     for file in source.iterdir():

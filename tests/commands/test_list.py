@@ -30,9 +30,12 @@ def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
     truths = {name: known["scenes"][f"middlebury2005/{name}"]["truth"] for name in ("Art", "Computer", "Drumsticks")}
     assert truths == {"Art": True, "Computer": False, "Drumsticks": False}
     assert known["metrics"]["total_bad_1"]["unit"] == "%"
+    assert (len(known["sets"]["worlds/quick"]), known["sets"]["paper"][0]) == (12, "middlebury2001/tsukuba")
     status, out, _ = run(capsys, "list")
     assert status == 0
-    assert all(word in out for word in ("materiality", "preset=paper", "middlebury2003/teddy", "total_bad_1"))
+    assert all(
+        word in out for word in ("materiality", "preset=paper", "middlebury2003/teddy", "worlds/quick", "total_bad_1")
+    )
     lines = [line.strip("│ ") for line in out.splitlines()]
     energy = lines.index("energy:")
     assert lines[energy + 1] == "count=0.3: a number"

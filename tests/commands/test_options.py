@@ -19,6 +19,9 @@ SMALL = "synthetic/box[size=96x72]"
         ("--jobs 0", "jobs '0' is not a whole number from 1 to 256"),
         ("--threads 1000", "threads '1000' is not a whole number from 1 to 256"),
         ("--isolation none", "isolation 'none' is not process or shared"),
+        ("-m bad_1 -m bad_0", "metric bad_0: 0 is not a number from 0.001 to 1000 of at most 6 digits"),
+        ("-m bad_x", "unknown metric 'bad_x': did you mean 'bad_@'? Possible: a50, "),
+        ("--metrics kitty", "unknown metrics 'kitty': did you mean 'kitti'? Possible: eth3d, hci, kitti, middlebury"),
     ],
 )
 def test_limits_that_make_no_sense_are_refused(
@@ -34,3 +37,17 @@ def test_limits_that_make_no_sense_are_refused(
     assert ended.value.code == 2
     assert capsys.readouterr().err.startswith(f"matbench: {said}")
     assert not list(tmp_path.iterdir())
+
+
+def test_metrics_by_name_and_by_set_each_once() -> None:
+    from matbench.commands.options import Options, asked_metrics, need_volumes
+
+    assert asked_metrics(["bad_3.0", "total_bad_2", "bad_3"], "middlebury")[:3] == (
+        "bad_3",
+        "total_bad_2",
+        "total_bad_0.5",
+    )
+    assert Options(metric=["d1"]).settings.metrics == ("d1",)
+    assert Options().settings.metrics == ()
+    assert need_volumes(["bad_3", "surface_f_1"])
+    assert not need_volumes(["bad_3"])

@@ -24,7 +24,9 @@ def test_progress_names_what_runs_and_counts_what_is_left() -> None:
     now = [0.0]
     fast, slow = [cell(k) for k in range(6)], [cell(k, "slow") for k in range(2)]
     progress = Progress(None, [*fast, *slow], done=2, clock=lambda: now[0])
+    assert "2/10 cells · getting ready" in shown(progress), "kernels may be compiled for long"
     progress("start", fast[0], None)
+    assert "getting ready" not in shown(progress)
     progress("start", slow[0], None)  # several at once, as with --jobs
     assert progress.seconds_left() is None
     text = shown(progress)
@@ -42,6 +44,9 @@ def test_progress_names_what_runs_and_counts_what_is_left() -> None:
     # five of 3 s and one of 33 s are waiting: two at once cannot be quicker than the longest
     assert progress.seconds_left() == pytest.approx(33)
     assert "4/10 cells · 1 failed · about 33 s left" in shown(progress, 70)
+    narrow = Progress(Console(width=32, file=io.StringIO()), [*fast, *slow], clock=lambda: now[0])
+    narrow._took["flat"] = [33.0]
+    assert "0/8 cells · about 4 min left" in shown(narrow, 32), "the bar is shorter"
     for one in (*fast[1:], slow[1]):
         progress("start", one, None)
     assert len(progress._running) == 6

@@ -1,5 +1,6 @@
 """`matbench report`: the table of a run, printed or written."""
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from typing_commands import run as matbench
 
 from matbench.errors import UserError
-from matbench.reports import paper, tables
+from matbench.reports import paper, run_tables, tables
 from matbench.reports.content import Report
 
 
@@ -46,7 +47,13 @@ def test_the_command_prints_or_writes(run: Path, report: Report, capsys: pytest.
         (["--format", "doc"], "doc"),
         (["-o", "t.doc"], "must end in .tex, .md or .csv"),
         (["-o", "/no/such/t.md"], "folder '/no/such' of --out does not exist"),
-        (["-m", "total_bad_3"], "unknown metric 'total_bad_3' of this run: did you mean 'total_bad_1'?"),
+        (["-m", "total_bad_3"], "was not scored by total_bad_3: type matbench score"),
+        (["-m", "total_bed_1"], "unknown metric 'total_bed_1' of this run: did you mean 'total_bad_1'?"),
+        (["-m", "bad_0"], "unknown metric 'bad_0' of this run"),
+        (
+            ["--metrics", "kitty"],
+            "unknown metrics 'kitty': did you mean 'kitti'? Possible: eth3d, hci, kitti, middlebury",
+        ),
         (["--region", "ocd"], "unknown region 'ocd' of total_bad_1 in this run: did you mean 'occ'?"),
     ],
 )
@@ -62,4 +69,20 @@ def test_a_folder_that_is_no_finished_run(run: Path, capsys: pytest.CaptureFixtu
     assert "is damaged" in matbench(capsys, "report", str(run))[2]
     (run / "results.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UserError, match="is damaged"):
-        paper.read_run(run)
+        run_tables.read_run(run)
+
+
+def test_several_metrics_stand_below_one_another(run: Path, report: Report, capsys: pytest.CaptureFixture[str]) -> None:
+    one, other = (paper.sheet(report.results, report.cells, name) for name in ("avg", "bad_1"))
+    line = ["report", str(run), "-m", "avg", "-m", "bad_1.0", "-m", "avg"]
+    assert matbench(capsys, *line, "--format", "md")[1] == f"{paper.markdown(one)}\n{paper.markdown(other)}"
+    status, text, _ = matbench(capsys, *line, "--format", "csv")
+    table = pd.read_csv(io.StringIO(text))
+    assert status == 0
+    assert list(table.metric.unique()) == ["avg", "bad_1"]
+    assert len(table) == len(one.texts) + len(other.texts)
+    status, text, _ = matbench(capsys, *line)
+    assert status == 0
+    assert "avg (px) by region" in text
+    assert "by metric, in 'all'" in text
+    assert "bad_1 (%) by region" not in text, "the first one has the tables of its own"

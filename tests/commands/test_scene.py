@@ -54,6 +54,29 @@ def test_from_a_folder_of_images_to_a_comparison(capsys: pytest.CaptureFixture[s
     assert (folder.parent / "run/report.html").exists()
 
 
+def test_a_folder_with_brackets_and_commas_is_named_in_quotes(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    folder.rename(folder.parent / "scans [2], a")
+    status, out, _ = run(capsys, "scene", "new", "scans [2], a")
+    assert status == 0
+    assert out.splitlines()[-1] == """next: matbench scene check '"./scans [2], a"'"""
+    status, out, _ = run(capsys, "scene", "check", '"./scans [2], a"')
+    assert status == 0, out
+    assert load_scene('"scans [2], a"[views=0+1]').name == '"./scans [2], a"[views=0+1]'
+    status, _, err = run(capsys, "scene", "check", "scans [2], a")
+    assert status == 2
+    assert "a name with brackets or commas stands in quotes of its own" in err
+
+
+def test_views_one_below_the_other_are_said_to_be_turned(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    for file in folder.glob("view*.png"):
+        write_png(file, np.rot90(cv2.imread(str(file))[..., ::-1], -1))
+    (folder / "truth2.png").unlink()
+    assert run(capsys, "scene", "new", "desk")[0] == 0
+    status, out, _ = run(capsys, "scene", "check", "desk")
+    assert status == 0, out
+    assert "turned: they were taken one below the other, so all are turned by a quarter, counter-clockwise" in out
+
+
 @pytest.mark.parametrize("count", [2, 3])
 def test_pictures_that_do_not_belong_together_are_not_confirmed(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int

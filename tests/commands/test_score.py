@@ -35,3 +35,13 @@ def test_the_archive_is_checked_in_another_process_without_the_run(tmp_path: Pat
     told = subprocess.run(line, capture_output=True, text=True, timeout=120, cwd=tmp_path)
     assert told.returncode == 0, told.stderr
     assert Store(tmp_path / "gone").command() == "typed"
+
+
+def test_metrics_that_are_asked_for_anew_are_no_changed_scores(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    archive, _ = export(done(tmp_path / "run", "flat"))
+    status, out, err = run(capsys, "score", archive, "-m", "bad_3")
+    assert status == 0, err
+    assert "metrics that were not there before: bad_3, total_bad_3" in out
+    assert "the scores are what they were, byte for byte" in out

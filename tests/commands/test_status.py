@@ -47,8 +47,10 @@ def test_a_run_under_way_names_what_runs_and_guesses_the_rest() -> None:
     assert told["running"] == [{"cell": str(cell), "key": cell.key, "seconds": 61.0}]
 
 
-def test_stale_tables_are_said_only_when_nobody_works() -> None:
+def test_stale_tables_are_said_only_when_nobody_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stale = Standing(Path("my run"), 1, {"ok": 1}, tables="cells were computed since")
+    (tmp_path / "my run").mkdir()
+    monkeypatch.chdir(tmp_path)
     assert _lines(stale)[-1] == "tables are stale, cells were computed since: type matbench score 'my run'"
     work = Work(Path("r"))
     assert not [line for line in _lines(Standing(Path("r"), 1, {}, work=work, left=1, tables="old")) if "stale" in line]

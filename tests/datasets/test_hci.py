@@ -1,11 +1,13 @@
 """Light fields: rows and columns of 9x9 views, signed truth, ranges."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from real import Real
 from scene_files import Layers, check_one_line, pfm_bytes, write_png
 
 from matbench import load_scene
@@ -100,8 +102,9 @@ def test_a_row_without_truth_can_be_looked_at(root: Path) -> None:
     assert scene.ref == 4
 
 
-def test_antinous_is_explained_by_its_truth(data_root: Path) -> None:
-    scene = load_scene("hci/antinous", data_root)
+def test_antinous_is_explained_by_its_truth(real: Real) -> None:
+    root = real("hci/antinous")
+    scene = load_scene("hci/antinous", root)
     assert scene.views.shape == (9, 512, 512, 3)
     assert scene.disparities == RANGE, "no parameters.cfg"
     assert -3.2 < scene.truth[4].min() < -3.1
@@ -109,7 +112,7 @@ def test_antinous_is_explained_by_its_truth(data_root: Path) -> None:
     assert _is_explained(scene)
     assert {"all", "nonocc", "occ", "disc", "textureless"} <= set(scene.regions)
     with pytest.raises(UserError, match=r"input_Cam\d+\.png is missing"):
-        load_scene("hci/antinous[column=4]", data_root)
+        load_scene("hci/antinous[column=4]", root)
 
 
 @pytest.mark.parametrize(
@@ -230,3 +233,28 @@ def test_any_cfg_gives_a_finite_range_or_one_line(tmp_path: Path, content: bytes
         check_one_line(error)
     else:
         assert np.isfinite([found.least, found.largest]).all()
+
+
+def test_the_border_and_the_masks_are_regions(root: Path, tmp_path: Path) -> None:
+    """Of the centre view, turned with it; a view without masks has the border only."""
+    folder = tmp_path / "hci" / "training" / "boxes"
+    shutil.copytree(root / "hci" / "training" / "boxes", folder)
+    plain = load_scene("hci/boxes", tmp_path)
+    inner = plain.regions["inner"]
+    assert plain.metrics == "hci"
+    assert inner[15:-15, 15:-15].all()
+    assert inner.sum() == (plain.height - 30) * (plain.width - 30)
+    mask = np.zeros((plain.height, plain.width), np.uint8)
+    mask[10:40, 20:60] = 255
+    write_png(folder / "mask_planes_lowres.png", mask)
+    row, column = (load_scene(f"hci/boxes{options}", tmp_path) for options in ("", "[column=4]"))
+    np.testing.assert_array_equal(row.regions["planes"], (mask > 0) & inner)
+    np.testing.assert_array_equal(column.regions["planes"], np.rot90((mask > 0) & inner))
+    assert set(row.regions) - set(plain.regions) == {"planes"}
+    assert row.digest == plain.digest, "no method sees it, so nothing is computed again"
+    assert row.truth_digest != plain.truth_digest
+    assert "planes" not in load_scene("hci/boxes[row=3]", tmp_path).regions
+    write_png(folder / "mask_planes_lowres.png", mask[:-1])
+    with pytest.raises(UserError, match=r"mask_planes_lowres\.png") as caught:
+        load_scene("hci/boxes", tmp_path)
+    check_one_line(caught.value)

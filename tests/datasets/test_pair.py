@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+import dataset_layouts
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scene_files import CALIB, Layers, check_one_line, write_pair
+from scene_files import CALIB, Layers, check_one_line, write_pair, write_png
 
 from matbench import load_scene
 from matbench.datasets.pair import pair
@@ -49,12 +50,25 @@ def test_a_scene_toml_beside_it_wins(folder: Path) -> None:
     assert load_scene(str(folder)).disparities == Range(2, 12)
 
 
+def test_a_mask_is_the_region_that_it_shows(tmp_path: Path) -> None:
+    folder = dataset_layouts.eth3d(tmp_path / "delivery_area_1l")
+    scene = load_scene(str(folder))
+    assert scene.disparities == Range(0, 23), "ndisp=24.0"
+    np.testing.assert_array_equal(scene.truth[0], dataset_layouts.truth())
+    np.testing.assert_array_equal(scene.regions["nonocc"], dataset_layouts.seen())
+    np.testing.assert_array_equal(scene.regions["occ"], ~dataset_layouts.seen())
+    write_png(folder / "mask0nocc.png", np.full((80, 96), 7, np.uint8))
+    with pytest.raises(UserError, match=r"mask0nocc\.png has other levels than 0, 128 and 255"):
+        load_scene(str(folder))
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         (CALIB.replace("ndisp=24\n", ""), ["lacks ndisp", "ndisp=280"]),
         (CALIB.replace("ndisp=24", "ndisp=0"), ["ndisp='0'"]),
         (CALIB.replace("ndisp=24", "ndisp=-3"), ["ndisp='-3'"]),
+        (CALIB.replace("ndisp=24", "ndisp=24.5"), ["ndisp='24.5'"]),
         (CALIB.replace("ndisp=24", "ndisp=nan"), ["ndisp='nan'"]),
         (CALIB.replace("ndisp=24", "ndisp=99999999999"), ["ndisp="]),
         (CALIB.replace("width=96", "width=2964"), ["96x80", "2964x80"]),

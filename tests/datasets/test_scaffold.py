@@ -3,6 +3,7 @@
 import tomllib
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,6 +14,7 @@ from matbench import load_scene
 from matbench.datasets.scaffold import natural, write_scene_toml
 from matbench.errors import UserError
 from matbench.scene import Range, Scene
+from matbench.scenes.scene_check import check
 
 NUMBERS = (8, 9, 10, 11, 12)
 
@@ -146,10 +148,71 @@ def test_a_picture_of_something_else_is_named(folder: Path, scene: Scene) -> Non
     )
 
 
+def test_ready_made_maps_are_no_views(folder: Path, scene: Scene) -> None:
+    """Without a name that says so: in grey among coloured views, in colours, and in grey among grey ones."""
+    grey = np.rint(scene.truth[scene.ref] * 20).astype(np.uint8)
+    write_png(folder / "sgbm.png", grey)
+    write_png(folder / "im7.png", cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1])
+    draft = write_scene_toml(folder)
+    assert tomllib.loads(draft.path.read_text())["views"] == [f"im{number}.png" for number in NUMBERS]
+    assert "left out: sgbm.png, grey where the others are coloured, as maps and masks are" in draft.remarks
+    assert "left out: im7.png, a map: it has plateaus, and no features of the others" in draft.remarks
+
+    (folder / "im7.png").unlink()
+    for number in NUMBERS:
+        write_png(folder / f"im{number}.png", cv2.cvtColor(scene.views[number - 8], cv2.COLOR_RGB2GRAY))
+    draft = write_scene_toml(folder, replace=True)
+    assert tomllib.loads(draft.path.read_text())["views"] == [f"im{number}.png" for number in NUMBERS]
+    assert any("sgbm.png, a map" in remark for remark in draft.remarks)
+
+
+def test_views_below_one_another_are_turned(tmp_path: Path, scene: Scene) -> None:
+    for number, view in zip(NUMBERS, scene.views, strict=True):  # a quarter clockwise: from the top
+        cv2.imwrite(str(tmp_path / f"im{number}.jpg"), np.rot90(view, -1)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 100])
+    draft = write_scene_toml(tmp_path)
+    assert tomllib.loads(draft.path.read_text())["vertical"]
+    assert "the views were taken one below the other: vertical = true turns them" in draft.remarks
+    found = load_scene(str(tmp_path))
+    assert found.labels == ("8", "9", "10", "11", "12")
+    assert np.abs(found.views.astype(int) - scene.views).mean() < 4
+    assert found.disparities.largest < 3 * scene.truth[scene.ref].max()
+    assert {finding.verdict for finding in check(found)} <= {"good", "note"}
+
+
+@pytest.mark.parametrize(("kept", "positions"), [((0, 1, 3), [0, 1, 3]), ((0, 2, 5), [0, 1, 2.5])])
+def test_uneven_steps_are_measured(tmp_path: Path, kept: tuple[int, ...], positions: list[float]) -> None:
+    full = load_scene("synthetic/box[n=6 ref=2 size=320x240]")
+    for view in kept:
+        write_png(tmp_path / f"{view}.png", full.views[view])
+    draft = write_scene_toml(tmp_path)
+    assert tomllib.loads(draft.path.read_text())["positions"] == positions
+    assert any("not taken at even steps" in remark for remark in draft.remarks)
+    found, truth = load_scene(str(tmp_path)), full.truth[2] * (kept[1] - kept[0])
+    assert truth.max() <= found.disparities.largest < 3 * truth.max()
+    assert {finding.verdict for finding in check(found)} <= {"good", "note"}
+
+
+def test_zeros_far_from_all_numbers_are_taken_for_unknown(folder: Path, scene: Scene) -> None:
+    truth = np.where(np.arange(320) < 40, 0, scene.truth[scene.ref])
+    (folder / "disp10.pfm").write_bytes(pfm_bytes(truth))
+    draft = write_scene_toml(folder)
+    assert (
+        'file = "disp10.pfm"\n# scale = 1    # stored number of one pixel per view step\nunknown = 0'
+        in draft.path.read_text()
+    )
+    (said,) = [remark for remark in draft.remarks if remark.startswith("disp10.pfm: ")]
+    assert said.startswith("disp10.pfm: 9600 of 76800 numbers are 0 (12.5 %), and no other is nearer to it than 2.5")
+    assert np.isnan(load_scene(str(folder)).truth[2][:, :40]).all()
+    draft.path.write_text(draft.path.read_text().replace("\nunknown = 0", "\n#"))
+    problems = [finding.text for finding in check(load_scene(str(folder))) if finding.verdict == "problem"]
+    assert any("if 0 means unknown, write unknown = 0" in problem for problem in problems)
+
+
 def test_names_that_need_quoting(tmp_path: Path, scene: Scene) -> None:
-    for view, name in enumerate(['q"uote 1.png', "back\\slash 2.png", "déjà\tvu 3.png"]):
+    for view, name in enumerate(['q"uote 1.png', "back\\slash 2.png", "déjà\u00a0vu 3.png", "a\ttab 4.png"]):
         write_png(tmp_path / name, scene.views[view])
-    write_scene_toml(tmp_path)
+    draft = write_scene_toml(tmp_path)
+    assert any("'a\\ttab 4.png' holds a tab" in remark for remark in draft.remarks), "no view can be called so"
     assert load_scene(str(tmp_path)).n == 3
 
 
@@ -157,9 +220,26 @@ def test_names_that_need_quoting(tmp_path: Path, scene: Scene) -> None:
 def test_too_few_images_are_refused(tmp_path: Path, scene: Scene, names: list[str]) -> None:
     for name in names:
         write_png(tmp_path / name, scene.views[0])
-    (tmp_path / "photo.JPG").write_bytes(b"")
-    with pytest.raises(UserError, match=r"too few images.*\.JPG are not read: save them as PNG"):
+    (tmp_path / "photo.WEBP").write_bytes(b"")
+    with pytest.raises(UserError, match=r"too few images.*\.WEBP are not read: save them as PNG"):
         write_scene_toml(tmp_path)
     assert not (tmp_path / "scene.toml").exists()
     with pytest.raises(UserError, match="does not exist"):
         write_scene_toml(tmp_path / "none")
+
+
+def test_a_folder_of_links_is_taken_or_refused_as_by_whoever_reads_the_scene(folder: Path, tmp_path: Path) -> None:
+    (folder / "store").mkdir()
+    for number in NUMBERS:  # within the folder, a link is a file as any other
+        (folder / f"im{number}.png").rename(folder / "store" / f"{number}")
+        (folder / f"im{number}.png").symlink_to(Path("store", str(number)))
+    write_scene_toml(folder)
+    assert load_scene(str(folder)).n == len(NUMBERS)
+    (folder / "scene.toml").unlink()
+    away = folder / "away"
+    away.mkdir()
+    for number in NUMBERS:
+        (away / f"im{number}.png").symlink_to(folder / "store" / str(number))
+    with pytest.raises(UserError, match=r"'im8.png' leads out of the folder .*: images and truth must lie in it"):
+        write_scene_toml(away)
+    assert not (away / "scene.toml").exists()

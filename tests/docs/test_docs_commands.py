@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 from following import Desk, lines, shortened, stage, table
-from machines import Machines, wait_until
+from machines import Machines
 from shown import SCENE
+from tools import need
+from waiting import wait_until
 
 from matbench.cli import app
 from matbench.recording import viewer
@@ -29,7 +31,7 @@ def test_commands_run_one_after_another(desk: Desk, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize("line", lines("dask"), ids=str)
 def test_commands_run_on_a_cluster(line: str, desk: Desk, request: pytest.FixtureRequest) -> None:
-    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'matbench-stereo[cluster]'")
+    need("dask")
     address = ""
     if HEAD in line:
         machines: Machines = request.getfixturevalue("machines")

@@ -11,7 +11,7 @@ from shown import METHOD, OWN_FILES, commands
 import matbench
 from matbench.measures.metrics import Metric
 from matbench.plans import plugins
-from matbench.results import scores
+from matbench.results import metric_catalogue
 
 PAGE = "docs/guides/extending.md"
 RUNS = {"mine.py": {"sgbm", "mine"}, "judge.py": {"sgbm", "okutomi_kanade"}, "walls.py": {"sgbm"}}
@@ -67,9 +67,9 @@ def test_what_the_page_says_of_python(desk: Desk) -> None:
 
 def test_metrics_are_what_they_say_worked_out_by_hand(desk: Desk) -> None:
     with plugins.using(["judge.py"]):
-        found = {m.name: m for m in scores.metrics() if isinstance(m, Metric)}
+        found = {m.name: m for m in metric_catalogue.metrics() if isinstance(m, Metric)}
     errors = np.array([-3, 0.2, 2, np.nan])
     assert found["fine"].compute(np.abs(errors)) == 25
     assert found["too_near"].compute(errors) == 25
     with pytest.raises(matbench.UserError, match="unknown metric 'too_near'"):
-        scores.metric_named("too_near")
+        metric_catalogue.metric_named("too_near")

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import rerun as rr
+from real import Real
 from shown import CI_SCRIPT, GROUPS, LINES, METHOD, SCRIPT, TEXT
 
 from matbench import load_scene
@@ -46,15 +47,16 @@ def test_the_scripts_run(tmp_path: Path) -> None:
             assert (tmp_path / "runs/two-methods/report.html").exists()
 
 
-def test_the_papers_setting_is_one_line(data_root: Path, tmp_path: Path) -> None:
+def test_the_papers_setting_is_one_line(real: Real, tmp_path: Path) -> None:
     from matbench.algorithms.sampling import search_space
 
     (line,) = (line for line in LINES if "preset=paper" in line and "--row" in line)
-    done = matbench(line.replace("DIR", str(data_root)), tmp_path)
+    root = real("middlebury2001/tsukuba")
+    done = matbench(line.replace("DIR", str(root)), tmp_path)
     assert done.returncode == 0, done.stderr
     (facts,) = (json.loads(path.read_text()) for path in tmp_path.glob("runs/paper/cells/*/cell.json"))
     params = facts["cell"]["method"]["params"]
-    scene = load_scene(facts["cell"]["scene"], data_root)
+    scene = load_scene(facts["cell"]["scene"], root)
     chosen = scene.choose(scene.widest(params["views"]))
     assert chosen.labels == ("col2", "col3", "col4", "col5")
     space = search_space(chosen, params["fineness"])

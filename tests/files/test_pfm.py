@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from real import Real
 from scene_files import check_one_line, pfm_bytes
 
 from matbench.errors import UserError
@@ -38,8 +39,9 @@ def test_what_opencv_writes_is_read_the_same(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_disparities(path), MAP)
 
 
-def test_the_real_map_is_as_opencv_reads_it(data_root: Path) -> None:
-    path = data_root / "hci/additional/antinous/gt_disp_lowres.pfm"
+def test_the_real_map_is_as_opencv_reads_it(real: Real) -> None:
+    name = "hci/additional/antinous/gt_disp_lowres.pfm"
+    path = real(name) / name
     found = read_disparities(path, (512, 512))
     np.testing.assert_array_equal(found, cv2.imread(str(path), cv2.IMREAD_UNCHANGED))
     assert found[-1].mean() > found[0].mean(), "the floor at the bottom is nearer than the wall behind the top"

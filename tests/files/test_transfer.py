@@ -99,7 +99,7 @@ def test_a_stalled_connection_is_left_and_tried_again(site, target: Path, sent: 
     start = time.monotonic()
     fetch(site, target, SHORT)
     assert target.read_bytes() == BODY
-    assert 0.4 <= time.monotonic() - start < 10
+    assert 0.4 <= time.monotonic() - start < 60
 
 
 def test_a_connection_that_stalls_for_ever_ends_in_words(site, target: Path) -> None:
@@ -108,7 +108,7 @@ def test_a_connection_that_stalls_for_ever_ends_in_words(site, target: Path) -> 
     start = time.monotonic()
     with pytest.raises(NoAnswer, match="stalled"):
         fetch(site, target, SHORT)
-    assert time.monotonic() - start < 10
+    assert time.monotonic() - start < 60
     assert len(site.requests) == 1 + QUICK.retries
 
 
@@ -118,7 +118,7 @@ def test_a_trickle_is_given_up_as_if_nothing_came(site, target: Path) -> None:
     start = time.monotonic()
     with pytest.raises(NoAnswer, match="stalled"):
         fetch(site, target, SHORT)
-    assert time.monotonic() - start < 20
+    assert time.monotonic() - start < 60
     assert len(site.requests) == 1 + SHORT.retries
     part = target.with_name("a.zip.part").read_bytes()
     assert part == BODY[: len(part)]
@@ -147,14 +147,14 @@ def test_a_server_gets_the_pause_that_it_asks_for(site, target: Path) -> None:
     site.faults["a.zip"] = [("busy", "1")]
     start = time.monotonic()
     fetch(site, target)
-    assert 1 <= time.monotonic() - start < 10
+    assert 1 <= time.monotonic() - start < 60
 
 
 def test_the_pause_may_be_asked_for_by_a_date(site, target: Path) -> None:
-    site.faults["a.zip"] = [("busy", formatdate(time.time() + 3, usegmt=True))]
-    start = time.monotonic()
+    date = int(time.time()) + 2  # dates have whole seconds
+    site.faults["a.zip"] = [("busy", formatdate(date, usegmt=True))]
     fetch(site, target)
-    assert 1.5 <= time.monotonic() - start < 10  # dates have whole seconds
+    assert date - 0.1 <= time.time() < date + 60
 
 
 def test_no_pause_is_longer_than_the_longest(site, target: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,7 +162,7 @@ def test_no_pause_is_longer_than_the_longest(site, target: Path, monkeypatch: py
     site.faults["a.zip"] = [("busy", "3600")]
     start = time.monotonic()
     fetch(site, target)
-    assert time.monotonic() - start < 10
+    assert time.monotonic() - start < 60
 
 
 @pytest.mark.parametrize("asked", ["soon", "-1", ""])
@@ -229,6 +229,15 @@ def test_a_redirection_is_followed(site, target: Path) -> None:
     assert target.read_bytes() == BODY
 
 
+@pytest.mark.parametrize("place", ["http://[", "http://host:port/", f"http://{'x' * 64}.org/", "ftp://host/a.zip"])
+def test_a_redirection_to_what_is_no_address_is_refused_at_once(site, place: str, target: Path) -> None:
+    site.moved["old.zip"] = place
+    with pytest.raises(TransferError, match="it cannot be fetched"):
+        download(f"{site.url}old.zip", target, LIMIT, QUICK)
+    assert len(site.requests) == 1
+    assert not list(target.parent.iterdir())
+
+
 FULL = """
 import sys
 from pathlib import Path
@@ -249,7 +258,7 @@ def test_a_file_that_cannot_be_written_is_an_os_error_not_a_network_error(site, 
         line,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 16, 1 << 16)),
     )
     assert done.stdout.strip() == "27", done.stderr  # EFBIG

@@ -15,7 +15,7 @@ from matbench import comparison
 from matbench.errors import UserError
 from matbench.plans import plugins
 from matbench.rescoring import open_run
-from matbench.results import freshness, scores
+from matbench.results import freshness, metric_catalogue
 from matbench.results.status import standing
 from matbench.runs.todo import explained
 
@@ -53,7 +53,7 @@ def test_what_changes_decides_what_is_done_again(tmp_path: Path, monkeypatch: py
         sys.modules.pop("extra", None)
         importlib.invalidate_caches()
         shutil.rmtree(site / "__pycache__", ignore_errors=True)
-        for cached in (plugins.installed, plugins.code_digest, scores._installed, freshness.digest):
+        for cached in (plugins.installed, plugins.code_digest, metric_catalogue._installed, freshness.digest):
             cached.cache_clear()
 
     def prepared(write: bool = False) -> comparison.Comparison:

@@ -7,11 +7,13 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from launcher import SCENE
 from places import METHODS as BEHAVED
-from resuming import PATIENCE, PLUGIN, command, wait_until
+from resuming import PATIENCE, PLUGIN, command
+from waiting import wait_until
 
 from matbench import comparison
 from matbench.cli import main
@@ -29,7 +31,7 @@ def test_a_second_process_is_refused_and_the_first_can_be_watched(tmp_path: Path
     line = command(plugin, run, "-a", "seeded", "--seed", "0", "1")
     first = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     try:
-        wait_until(lambda: any((run / "cells").glob("[0-9a-f]*")), "the first cell")
+        wait_until(lambda: any((run / "cells").glob("[0-9a-f]*")), PATIENCE, "the first cell")
         second = subprocess.run(line, capture_output=True, text=True, timeout=PATIENCE)
         assert second.returncode == 2
         assert second.stderr.count("\n") == 1
@@ -38,7 +40,7 @@ def test_a_second_process_is_refused_and_the_first_can_be_watched(tmp_path: Path
             prune(run)
         with pytest.raises(UserError, match="is in use by process"):
             open_run(run)[0].tables()
-        wait_until(lambda: standing(run).running, "the endless cell")
+        wait_until(lambda: standing(run).running, PATIENCE, "the endless cell")
         found = standing(run)
         assert found.work is not None
         assert (found.work.pid, found.counts, found.left) == (first.pid, {"ok": 1}, 1)
@@ -56,6 +58,55 @@ def test_a_second_process_is_refused_and_the_first_can_be_watched(tmp_path: Path
     ).stdout
     told = json.loads(said)
     assert (told["cells"], told["done"], told["left"], told["process"]) == (2, 1, 1, None)
+
+
+COMPILED = """
+import numba
+import numpy as np
+from matbench import Estimate
+
+@numba.njit(cache=True)
+def added(values, more):
+    for row in range(values.shape[0]):
+        for column in range(values.shape[1]):
+            values[row, column] += more * column
+    return values
+
+class Compiled:
+    def solve(self, scene, context):
+        return Estimate({scene.ref: added(np.ones(scene.views.shape[1:3], np.float32), np.float32(0.125))})
+"""
+
+RUN = """
+import sys
+from matbench import comparison
+ready = comparison.prepare("compiled", sys.argv[1], out=sys.argv[2], seed=range(3), plugin=sys.argv[3], command="")
+print("ready", flush=True)
+sys.stdin.readline()
+ready.run()
+print(*(ready.store.outcome(cell).maps for cell in ready.plan.cells))
+"""
+
+
+def test_two_runs_that_compile_into_one_empty_cache_at_once_get_the_same_maps(tmp_path: Path) -> None:
+    plugin, cache = tmp_path / "compiled.py", tmp_path / "cache"
+    plugin.write_text(COMPILED)
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    lines = [[sys.executable, "-c", RUN, SCENE, str(tmp_path / name), str(plugin)] for name in ("one", "two")]
+    both = [subprocess.Popen(line, env=environment, text=True, **pipes) for line in lines]
+    for one in both:
+        assert one.stdout is not None
+        assert one.stdout.readline() == "ready\n"
+    for one in both:
+        assert one.stdin is not None
+        one.stdin.write("\n")
+        one.stdin.flush()
+    told = [one.communicate(timeout=PATIENCE)[0].split() for one in both]
+    assert len({*told[0], *told[1]}) == 1, told
+    assert [len(maps) for maps in told] == [3, 3]
+    assert len(list(cache.rglob("*added*.nbi"))) == 1, "one cache"
 
 
 _DISK = """
@@ -99,7 +150,7 @@ def test_a_full_disk_stops_the_run_and_the_same_command_ends_it(tmp_path: Path) 
     assert (tmp_path / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
 
 
-def test_told_to_end_while_it_scores_it_ends_and_the_next_one_clears_away(
+def test_told_to_end_while_it_scores_it_writes_its_tables_first_and_the_next_one_clears_away(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run = tmp_path / "run"
@@ -110,11 +161,17 @@ def test_told_to_end_while_it_scores_it_ends_and_the_next_one_clears_away(
             main(line)
         return int(stop.value.code or 0)
 
+    made = scores.tables
+
+    def disturbed(*given: Any) -> Any:
+        os.kill(os.getpid(), signal.SIGTERM)
+        return made(*given)
+
     with monkeypatch.context() as patch:
-        patch.setattr(scores, "tables", lambda *_: os.kill(os.getpid(), signal.SIGTERM))
-        assert ended() == 130
-    told = capsys.readouterr()
-    assert (told.out, told.err.splitlines()[-1]) == ("", "matbench: interrupted")
+        patch.setattr(scores, "tables", disturbed)
+        assert ended() == 0
+    assert (run / "results.csv").stat().st_size > 0
+    capsys.readouterr()
     (run / ".results.csv.abc123").touch()  # as `kill -9` leaves it
     assert ended() == 0
     assert {path.name for path in run.glob(".*")} == {".lock"}

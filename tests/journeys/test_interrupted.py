@@ -10,6 +10,7 @@ from pathlib import Path
 import psutil
 from compared import SMALL, cells
 from places import METHODS
+from waiting import wait_until
 
 from matbench import comparison
 
@@ -39,7 +40,7 @@ def test_told_to_end_it_leaves_nothing_behind(tmp_path: Path) -> None:
     assert children
     process.terminate()
     assert process.wait(timeout=150) == 130
-    assert not psutil.wait_procs(children, timeout=60)[1]
+    assert not psutil.wait_procs(children, timeout=300)[1]
     assert not list((tmp_path / "run" / "cells").glob(".*"))
 
 
@@ -53,13 +54,6 @@ def test_killed_and_taken_up_again(tmp_path: Path) -> None:
     ready = comparison.prepare(["flat", "slow"], SMALL, out=tmp_path / "run", plugin=[METHODS])
     assert ready.store.outcome(ready.plan.cells[0]).status == "ok"  # type: ignore[union-attr]
     assert [c.method.algorithm for c in ready.pending().cells] == ["slow"]
-
-
-def wait_until(happens: object, seconds: float = 60) -> None:
-    end = time.monotonic() + seconds
-    while not happens():  # type: ignore[operator]
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.05)
 
 
 def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ import pandas as pd
 from matbench.plans.plan import Cell, Method, Plan
 from matbench.reports import curves, switches, tables
 from matbench.reports.content import Report
-from matbench.reports.numbers import Numbers, turned
+from matbench.reports.numbers import Numbers
+from matbench.reports.standing import turned
 from matbench.results.ablation import ablation
 from matbench.results.sweeps import sweeps
 from matbench.spec import read_scene

@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from shown import OWN_FILES
+from tools import need
 
 from matbench.cli import main
 from matbench.plans import plugins
@@ -118,7 +119,8 @@ def test_what_is_offered_is_listed(place: Path, run) -> None:
     status, out, _ = run("list", "--json", *FILES)
     assert status == 0
     told = json.loads(out)
-    assert told["scenes"]["walls/near"] == {"views": 3, "sizes": {"96x72": [96, 72]}, "truth": True, "present": True}
+    known = {"views": 3, "sizes": {"96x72": [96, 72]}, "truth": True, "present": True, "endless": False}
+    assert told["scenes"]["walls/near"] == known
     assert told["metrics"]["roughness"] == {
         "unit": "px",
         "better": "lower",
@@ -157,7 +159,7 @@ def test_scenes_of_ones_own_are_shown_and_checked(place: Path, run) -> None:
 
 
 def test_a_cluster_is_sent_the_scenes(place: Path) -> None:
-    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'matbench-stereo[cluster]'")
+    need("dask")
     import matbench
 
     table = matbench.compare(

@@ -97,7 +97,7 @@ def test_a_paper_says_the_same(format: paper.Format) -> None:
         assert 'mean,silent,0.00,0.00,,bad_1,%,"answers too little in nonocc, all"' in text
     else:
         starred = {"tex": "0.25* & 0.25* & --", "md": r"0.25\* | 0.25\* | –"}[format]
-        assert starred in text
+        assert starred in " ".join(text.split())
         assert "silent: no answer anywhere" in text
         assert "fewer than 90" in text
     assert {"tex": r"\textbf{8.00}", "md": "**8.00**", "csv": "8.00"}[format] in text

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from needles import SEARCHING, looking_for
 
-import matbench
 from matbench import comparison, load_scene
 from matbench.plans.record_option import RecordOption
 from matbench.plans.settings import Settings
@@ -18,8 +17,8 @@ def search(tmp_path: Path, name: str, options: str = "", settings: Settings = Se
     method = looking_for(tmp_path, load_scene(name), options)
     out = tmp_path / "run"
     asked = {"plugin": SEARCHING, "out": out, "settings": settings, "seed": [0, 1]}
-    matbench.compare(method, name, record=settings.record or False, **asked)
     ready = comparison.prepare(method, name, **asked)
+    ready.run()
     outcomes = [ready.store.outcome(cell) for cell in ready.plan.cells]
     assert all(outcome is not None and outcome.status == "ok" for outcome in outcomes), outcomes
     return [(outcome.work["found"], outcome.work["wanted"]) for outcome in outcomes if outcome is not None]

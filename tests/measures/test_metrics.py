@@ -1,16 +1,17 @@
 """Scores: published numbers, perfect and empty maps, ties, holes."""
 
+from itertools import product
 from math import isnan
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from real import Real
 
 from matbench import load_scene
 from matbench.files.images import read_levels
-from matbench.measures.metrics import METRICS, MapInRegion, Metric, error_map, score
+from matbench.measures.metrics import METRICS, MapInRegion, Metric, error_map, quantile, score
 
 NAMES = [
     "bad_0.5",
@@ -48,9 +49,9 @@ def _all(array: np.ndarray) -> np.ndarray:
         ("teddy", 4, (2.99, 8.16, 9.62)),
     ],
 )
-def test_patchmatch_scores_as_published(data_root: Path, scene: str, grey: int, published: tuple[float, ...]) -> None:
+def test_patchmatch_scores_as_published(real: Real, scene: str, grey: int, published: tuple[float, ...]) -> None:
     """Bleyer et al. 2011, bad pixels at 1 px in per cent: nonocc, all, disc."""
-    folder = data_root / "middlebury" / "eval_v2" / scene
+    folder = real(f"middlebury/eval_v2/{scene}") / "middlebury/eval_v2" / scene
     estimate, truth = (
         read_levels(folder / f"{name}.png").astype(np.float32) / grey for name in ("alg117", "groundtruth")
     )
@@ -188,3 +189,10 @@ def test_bad_and_invalid_make_total_bad(errors: list[float], threshold: str) -> 
     estimate = _map(*errors)
     found = score(estimate, np.zeros_like(estimate), _all(estimate), 1)
     assert found[f"total_bad_{threshold}"] == pytest.approx(found[f"bad_{threshold}"] + found["invalid"])
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 10, 101, 4000])
+def test_quantiles_are_numpys_to_the_last_bit(count: int) -> None:
+    rows = np.random.default_rng(count).exponential(1, (20, count))
+    for row, share in product(rows, (0.5, 0.9, 0.95, 0.99)):
+        assert quantile(row, share) == np.quantile(row, share)

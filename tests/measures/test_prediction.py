@@ -1,10 +1,9 @@
 """Prediction of a withheld view: carrying maps, colours, and the protocol from end to end."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from attrs import evolve
+from real import Real
 
 import matbench
 from matbench.datasets.synthetic import SYNTHETIC
@@ -81,8 +80,8 @@ def test_methods_do_not_see_the_view_and_its_truth(scene: Scene) -> None:
     assert left.ref == 0
 
 
-def test_every_scene_can_be_asked_for_a_prediction(data_root: Path) -> None:
-    held = matbench.load_scene("middlebury2003/teddy[predict=right views=0:9:2]", data_root)
+def test_every_scene_can_be_asked_for_a_prediction(real: Real) -> None:
+    held = matbench.load_scene("middlebury2003/teddy[predict=right views=0:9:2]", real("middlebury2003/teddy"))
     assert held.name == "middlebury2003/teddy[predict=right views=0:9:2]"
     assert held.held_out is not None
     assert (held.n, held.held_out.label, held.held_out.steps) == (4, "8", 3)

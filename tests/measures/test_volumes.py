@@ -8,6 +8,7 @@ from attrs import evolve
 from exact_volumes import SMALL, along
 
 from matbench.datasets.synthetic import SYNTHETIC
+from matbench.files.arrays import Arrays
 from matbench.measures.volume_metrics import (
     brier,
     precision,
@@ -71,6 +72,35 @@ def test_damaged_files_are_no_volume(damage: str, tmp_path: Path) -> None:
         np.savez(path, levels=levels[:2], space=facts, views=np.array([0, 1]))
     with pytest.raises((ValueError, OSError)):
         StoredVolume.read(path)
+
+
+def test_a_volume_that_claims_more_than_its_scene_has_is_not_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = Arrays.read
+
+    def all_but_levels(self: Arrays, name: str) -> object:
+        assert name != "levels"
+        return original(self, name)
+
+    scene, path = SYNTHETIC.load("box", SMALL, None), tmp_path / "volume.npz"
+    views = tuple(range(scene.n))
+    right = DisparitySpace.covering(scene.disparities, scene.n, scene.height, scene.width, 2)
+    wrong = (
+        evolve(right, rows=scene.height + 1),
+        evolve(right, last=right.last + 500),  # many planes of zeros, which pack to next to nothing
+        DisparitySpace.covering(scene.disparities, scene.n, scene.height, scene.width, 17),
+    )
+    for space in (right, *wrong):
+        StoredVolume(space, np.zeros(space.shape, np.uint8), views).write(path)
+        assert StoredVolume.read(path).space == space
+        if space is right:
+            assert StoredVolume.read(path, scene).space == space
+            continue
+        with monkeypatch.context() as patch:
+            patch.setattr(Arrays, "read", all_but_levels)
+            with pytest.raises(ValueError, match=r"another scene|more than the scene has use for"):
+                StoredVolume.read(path, scene)
 
 
 def test_unknown_truth_does_not_count(exact: tuple[Volume, StoredVolume]) -> None:

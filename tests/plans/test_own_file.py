@@ -1,8 +1,11 @@
 """Users' own files with what lies beside them, and the files that methods read."""
 
 import json
+import os
+import pickle
 import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +18,7 @@ from matbench import parameters
 from matbench.algorithms.command import Command
 from matbench.cli import main
 from matbench.errors import UserError
-from matbench.plans import plugins
+from matbench.plans import own_file, plugins
 from matbench.plans.plan import methods
 
 SCENE = "synthetic/box[size=48x36]"
@@ -244,3 +247,28 @@ def test_paths_are_parameters_as_others_are() -> None:
     assert parameters.changed(made) == {"file": str(Path.home() / "b"), "without": "c"}
     assert parameters.describe(Path) == "a path"
     assert parameters.paths_of(made) == {"file": made.file, "without": made.without}
+
+
+@pytest.mark.parametrize("name", ["mine", "json", "my-method", "a.b", "own_file"])
+def test_another_process_finds_the_classes_of_a_file_under_their_names(tmp_path: Path, name: str) -> None:
+    sent = []
+    for folder in ("one", "two"):  # of the same name
+        path = put(tmp_path / folder, "Mine", 1).with_name(f"{name}.py")
+        (tmp_path / folder / "mine.py").rename(path)
+        made = plugins.algorithm("mine", [path]).load()()
+        helper = sys.modules[type(made).__module__].__dict__["helper"]
+        sent.append(pickle.dumps((made, helper.more)))
+    code = "import pickle, sys; print(type(pickle.load(sys.stdin.buffer)[0]).solve.__code__.co_filename)"
+    ask = [sys.executable, "-c", code]
+    for folder, pickled in zip(("one", "two"), sent, strict=True):
+        found = subprocess.run(ask, input=pickled, capture_output=True, check=True)
+        assert Path(found.stdout.decode().strip()) == tmp_path / folder / f"{name}.py"
+    (tmp_path / "two" / "helper.py").write_text(HELPER.format(8))
+    changed = subprocess.run(ask, input=sent[1], capture_output=True, check=False)
+    assert b"is not what it was when the process began that asks for it" in changed.stderr.splitlines()[-1]
+
+
+def test_a_pipe_is_no_plug_in_and_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "mine.py")
+    with pytest.raises(UserError, match=r"mine\.py' is no file"):
+        own_file.import_file(tmp_path / "mine.py")

@@ -11,7 +11,7 @@ import matbench
 from matbench.errors import UserError
 from matbench.measures.metrics import METRICS, Metric
 from matbench.plans import plugins
-from matbench.results import scores
+from matbench.results import metric_catalogue
 from matbench.scenes.catalogue import listings, load_scene
 
 SCENE = """
@@ -54,10 +54,10 @@ def test_a_file_offers_what_is_in_it_and_nothing_else(tmp_path: Path) -> None:
 
 def test_scenes_and_metrics_are_known_within_the_block_only(tmp_path: Path) -> None:
     files = [written(tmp_path, OWN_FILES[name], name) for name in ("walls.py", "judge.py")]
-    before = scores.metrics()
+    before = metric_catalogue.metrics()
     with plugins.using(files):
         assert {"walls/near", "walls/far"} <= set(listings())
-        assert [m.name for m in scores.metrics()[len(before) :]] == ["fine", "too_near", "roughness"]
+        assert [m.name for m in metric_catalogue.metrics()[len(before) :]] == ["fine", "too_near", "roughness"]
         seen: list[bool] = []
         other = threading.Thread(target=lambda: seen.append("walls" in plugins.datasets()))
         other.start()
@@ -66,7 +66,7 @@ def test_scenes_and_metrics_are_known_within_the_block_only(tmp_path: Path) -> N
         with plugins.using(files[1:]):
             assert "walls" not in plugins.datasets()
         assert load_scene("walls/near").name == "walls/near"
-    assert scores.metrics() == before
+    assert metric_catalogue.metrics() == before
     with pytest.raises(UserError, match="unknown dataset 'walls'"):
         load_scene("walls/near")
 
@@ -106,14 +106,14 @@ def test_what_is_wrong_with_a_file_is_one_line(tmp_path: Path, text: str, said: 
 )
 def test_a_metric_that_is_none_is_refused(tmp_path: Path, line: str, said: str) -> None:
     with pytest.raises(UserError, match=r"own\.py") as told, plugins.using([metric_file(tmp_path, line)]):
-        scores.metrics()
+        metric_catalogue.metrics()
     assert said in str(told.value)
 
 
 def test_metrics_that_are_known_already_are_not_taken_twice(tmp_path: Path) -> None:
     file = metric_file(tmp_path, "from matbench.measures.metrics import METRICS\nM = Metric('m', '', 'lower', '', max)")
     with plugins.using([file]):
-        names = [metric.name for metric in scores.metrics()]
+        names = [metric.name for metric in metric_catalogue.metrics()]
     assert len(names) == len(set(names))
     assert names[-1] == "m"
 
@@ -138,3 +138,18 @@ def test_old_metrics_are_given_absolute_errors(tmp_path: Path) -> None:
     old = Metric("old", "px", "lower", "as before", lambda errors: float(np.nanmax(errors)))
     assert old.takes == "absolute"
     assert old.picture is None
+
+
+def test_some_built_in_methods_run_only_when_they_are_named() -> None:
+    """A newcomer's first run takes less than a minute; slow methods and plain ones are asked for."""
+    default, every = plugins.default_algorithms(), plugins.built_in_algorithms()
+    assert {"materiality", "multiview_sgm", "kang_szeliski", "guided_filter", "sgbm"} <= set(default) < set(every)
+    assert {"graph_cut", "kolmogorov_zabih", "niquin"} <= set(every) - set(default)
+    assert "command" not in every
+    assert "maps" not in every
+
+
+@pytest.mark.parametrize("name", ["mine.py", "old/mine.py:"])
+def test_a_file_without_its_class_is_told_how_it_is_written(name: str) -> None:
+    with pytest.raises(UserError, match=f"unknown algorithm '{name}': write FILE.py:Class"):
+        plugins.algorithm(name)

@@ -12,7 +12,7 @@ def test_a_request_is_read(tmp_path: Path) -> None:
     (tmp_path / "request.toml").write_text("algorithms = ['sgbm', 'materiality[pairs=all,consecutive]']")
     algorithms = ["sgbm", "materiality[pairs=all,consecutive]"]
     assert read_request(tmp_path / "request.toml") == (algorithms, None)
-    with pytest.raises(UserError, match="none\\.toml cannot be read: No such file"):
+    with pytest.raises(UserError, match=r"request .*none\.toml is missing"):
         read_request(tmp_path / "none.toml")
 
 
@@ -37,7 +37,7 @@ def test_seeds_are_taken_once_each(given: object, seeds: list[int]) -> None:
     assert seeds_of(given) == seeds
 
 
-@pytest.mark.parametrize("given", [-1, True, 1.5, "1", [], [0, -2], None])
+@pytest.mark.parametrize("given", [2**64, -1, True, 1.5, "1", [], [0, -2], None])
 def test_what_is_no_seed_is_refused(given: object) -> None:
     with pytest.raises(UserError, match="is not one or several whole numbers from 0"):
         seeds_of(given)

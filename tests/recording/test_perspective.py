@@ -18,3 +18,14 @@ def test_depths_are_positive_and_bounded(least: float, largest: float) -> None:
     assert points[:, 2].max() <= DEEPEST + 1e-4
     assert (radii > 0).all()
     assert perspective.is_true == (least == 4), "true perspective where it is possible"
+
+
+def test_rays_of_views_at_uneven_steps_begin_where_the_views_lie_and_meet_the_point() -> None:
+    scene = make_scene()
+    uneven = evolve(scene, positions=tuple(place * (1.5 if place == scene.n - 1 else 1) for place in scene.places))
+    perspective = Perspective.of(uneven)
+    own = perspective.ray(scene.ref, (3, 5), 1.0)
+    for view in range(scene.n):
+        ray = perspective.ray(view, (3, 5), 1.0)
+        assert ray[0][0] == pytest.approx(uneven.steps(view) * perspective.baseline)
+        assert ray[1] == own[1]

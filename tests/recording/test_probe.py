@@ -32,3 +32,12 @@ def test_pairs_of_a_reference_fill_all_three_colours() -> None:
     assert shown is not None
     assert shown.picture[0, 0, 0].tolist() == [51, 102, 153]  # 0-2, 1-2 and 2-3: those least apart
     assert shown.names == ("a-c", "b-c", "c-d")
+
+
+def test_names_of_a_method_are_kept_printable() -> None:
+    space = DisparitySpace(5, 2, 4, 0, 1)
+    probe = CapturingProbe(RecordOption(rows=(0,), volumes=True))
+    probe.volume("half \udc80", Volume(space, np.zeros(space.shape, np.float32), (0, 1, 2, 3, 4)))
+    probe.iteration(0, {"\x1b[2J": 1.0})
+    assert list(probe.volumes) == [r"half \x80"]
+    assert list(probe.energies) == [r"\x1b[2J"]

@@ -58,7 +58,20 @@ def test_costs_are_those_of_the_printed_tables(report: Report) -> None:
     marked = [entry for entry in made.costs["seconds"].values() if "not ranked" in entry[3:]]
     assert [entry[:3] for entry in marked] == [[1.5, "1.50", tables.NOT_RANKED]], "one ran while others did"
     assert made.costs["peak_mb"]["good"][:2] == [100, "100"]
+    assert set(made.costs) == {"seconds", "peak_mb"}, "nobody told what it took of a device"
     html = page.render(evolve(report, cells=company))
     note = costs.timing_note(company).replace(" (*)", "")
     assert f"{note[0].upper()}{note[1:]}" in html
     assert "beside other cells" not in page.render(report)
+
+
+def test_what_methods_say_of_a_device_is_shown_and_not_ranked(report: Report) -> None:
+    told = report.cells.assign(
+        device_seconds=np.nan, device_mb=np.where(report.cells["algorithm"] == "good", 512, np.nan)
+    )
+    labelled = evolve(report, results=tables.labelled(report.results), cells=tables.labelled(told))
+    made = Numbers(labelled, tables.shared(report.results, told))
+    assert list(made.costs) == ["seconds", "peak_mb", "device_mb"]
+    assert made.costs["device_mb"]["good"] == [512, "512", 0]
+    assert [entry[0] for method, entry in made.costs["device_mb"].items() if method != "good"].count(None) >= 1
+    assert "device memory as told" in page.render(evolve(report, cells=told))

@@ -15,11 +15,29 @@ from matbench.results.sweeps import COLUMNS, Sweep
 
 METHODS = (("good", ""), ("<b>&", "x=$1 y=_"))
 VALUES = (0.0, 2.0, 4.5)
+UNDECIDED = "undecided: about 23 scenes like these would decide it"
 
 
 def sweep(scenes: int = 2, low: float = float("nan")) -> Sweep:
     rows = [
-        (a, p, v, region, metric, "%", 10 * i + v, low, low + 1, v, low, low + 2, scenes, "higher" if v else "", 100.0)
+        (
+            a,
+            p,
+            v,
+            region,
+            metric,
+            "%",
+            10 * i + v,
+            low,
+            low + 1,
+            v,
+            low,
+            low + 2,
+            scenes,
+            "undecided" if v else "",
+            23.0,
+            100.0,
+        )
         for i, (a, p) in enumerate(METHODS)
         for region in ("occ", "all", "nonocc", "mine")
         for metric in ("bad_1", "total_bad_1")
@@ -37,7 +55,17 @@ def test_the_lines_are_those_of_one_metric_in_the_regions_order() -> None:
     lines = curves.lines(sweep())
     assert list(lines.columns) == ["region", "method", "0", "2", "4.5", "change", "interval", "scenes", "verdict"]
     assert lines.region.tolist() == ["nonocc", "nonocc", "all", "all", "occ", "occ", "mine", "mine"]
-    assert lines.loc[1].tolist() == ["nonocc", "<b>&[x=$1 y=_]", "10.00", "12.00", "14.50", "+4.50", "–", "2", "higher"]
+    assert lines.loc[1].tolist() == [
+        "nonocc",
+        "<b>&[x=$1 y=_]",
+        "10.00",
+        "12.00",
+        "14.50",
+        "+4.50",
+        "–",
+        "2",
+        UNDECIDED,
+    ]
     assert curves.lines(sweep(FEW, 1.0)).interval[0] == "+1.00 .. +3.00"
 
 
@@ -52,7 +80,7 @@ def test_the_caption_says_over_what_and_what_to_beware_of() -> None:
     ):
         assert words in said
     assert "too few" not in curves.caption(sweep(FEW, 1.0))
-    assert "95 % bootstrap" in curves.caption(sweep(FEW, 1.0))
+    assert "95 % over scenes" in curves.caption(sweep(FEW, 1.0))
     empty = evolve(sweep(), scenes=(), curves=_frame([]))
     assert curves.caption(empty).startswith("No scene has every value.")
     assert curves.figure(empty) is None
@@ -82,7 +110,7 @@ def test_the_figure_has_a_panel_per_region_a_curve_per_method_and_bands_where_sc
 
 def test_many_curves_have_names_that_do_not_touch() -> None:
     rows = [
-        (f"m{i}", "", v, "all", "total_bad_1", "%", 5 + i / 100, *[0.0] * 5, 2, "", 100.0)
+        (f"m{i}", "", v, "all", "total_bad_1", "%", 5 + i / 100, *[0.0] * 5, 2, "", None, 100.0)
         for i in range(7)
         for v in VALUES
     ]

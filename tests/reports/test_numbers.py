@@ -1,16 +1,18 @@
 """All numbers that a reader of the page can choose."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import pytest
 from attrs import evolve
 
-from matbench.measures.statistics import Effect, paired_effect
+from matbench.measures.statistics import paired_effect
+from matbench.reports import numbers as numbers_module
 from matbench.reports import tables
 from matbench.reports.content import Report
-from matbench.reports.numbers import Numbers, entries, turned, words
+from matbench.reports.numbers import Numbers, entries
 
 
 @pytest.fixture
@@ -79,7 +81,17 @@ def test_entries_hold_number_text_and_place() -> None:
     assert [higher[m][2] for m in "ab"] == [1, 2]
 
 
-def test_an_effect_is_turned_with_its_interval() -> None:
-    assert turned(Effect(2.0, 1.0, 4.0, 0.5, 6)) == Effect(-2.0, -4.0, -1.0, -0.5, 6)
-    assert words("lower", higher=False) == words("higher", higher=True) == "better"
-    assert words("too few scenes", higher=True) == "too few scenes"
+def test_of_very_many_scenes_some_are_shown_from_the_easiest_to_the_hardest(report: Report) -> None:
+    table, names = report.results, [f"made/s{k}" for k in range(700)]
+    first = table[table["scene"] == table["scene"].iloc[0]]
+    results = pd.concat([first.assign(scene=name, value=first["value"] + k) for k, name in enumerate(names)])
+    row = report.cells[(report.cells["scene"] == table["scene"].iloc[0]) & (report.cells["status"] == "ok")]
+    cells = pd.concat([row.assign(scene=name) for name in names])
+    many = evolve(report, results=tables.labelled(results), cells=tables.labelled(cells))
+    numbers = Numbers(many, tables.shared(many.results, many.cells))
+    count = numbers_module.SHOWN // len(numbers.scope.methods)
+    assert len(numbers.shown) == count
+    assert {names[0], names[-1]} <= set(numbers.shown)
+    assert numbers.counts["total_bad_1"]["all"] == 700, "means are over all"
+    places = [names.index(name) for name in numbers.shown]
+    assert max(b - a for a, b in pairwise(places)) <= 5

@@ -10,6 +10,6 @@ def test_the_figure_takes_names_literally(report: Report) -> None:
     figure = page_figures.cost(rows, "total_bad_1 all", "%")
     assert figure is not None
     text = page_figures.svg(figure)
-    assert "$x^$ \N{REPLACEMENT CHARACTER}" in text
+    assert r"$x^$ \x07" in text
     assert "&lt;b&gt;&amp;" in text
     assert page_figures.cost(rows.assign(ranked=False), "total_bad_1 all", "%") is None

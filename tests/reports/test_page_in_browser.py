@@ -1,7 +1,6 @@
 """The page in a real browser: what is clicked, typed and seen; skipped, saying so, where there is none."""
 
 import json
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from attrs import evolve
+from tools import need
 
 from matbench.measures.volumes import StoredVolume
 from matbench.reports import page, tables
@@ -23,7 +23,6 @@ from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 from selenium.webdriver.support.ui import Select, WebDriverWait  # noqa: E402
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 PATIENCE = 60  # s: others use the machine, too
 GOOD, BROKEN = "good", "broken[x=[1] \"'&]"
 
@@ -31,10 +30,7 @@ GOOD, BROKEN = "good", "broken[x=[1] \"'&]"
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """One headless browser for all tests."""
-    binary = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    driver = shutil.which("chromedriver")
-    if binary is None or driver is None:
-        pytest.skip("no Chromium with chromedriver (Debian: apt-get install chromium chromium-driver)")
+    binary, driver = need("browser")
     options = webdriver.ChromeOptions()
     options.binary_location = binary
     for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1366,900"):

@@ -1,7 +1,9 @@
 """Slices that a page shows."""
 
 import numpy as np
+import pytest
 from attrs import evolve
+from rigs import uneven
 
 from matbench.measures.volumes import StoredVolume
 from matbench.reports import page_slices
@@ -9,8 +11,9 @@ from matbench.scenes.catalogue import load_scene
 from matbench.space import DisparitySpace, Volume, surface, visibility
 
 
-def test_similarity_is_highest_at_the_truth() -> None:
-    scene = load_scene("synthetic/box")
+@pytest.mark.parametrize("kept", [(), (0, 2, 5)])
+def test_similarity_is_highest_at_the_truth(kept: tuple[int, ...]) -> None:
+    scene = uneven(load_scene("synthetic/box[n=6 ref=2]"), kept, 2) if kept else load_scene("synthetic/box")
     row = scene.height // 2
     found = page_slices.similarity(scene, row)
     low, high = found.ends

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from figures import made
+from latex import compile_latex
 
 from matbench.reports import map_figure, paper_figure
 
@@ -18,3 +19,4 @@ def test_hostile_names_are_only_letters(tmp_path: Path) -> None:
     assert r"\$m\_1" in paths[3].read_text()
     again = paper_figure.write_figure(drawn, tmp_path / "g")
     assert paths[0].read_bytes() == again[0].read_bytes()
+    compile_latex(r"\input{f}", tmp_path)

@@ -1,6 +1,10 @@
 """The ablation's table in every format: the same numbers."""
 
+from math import nan
+from pathlib import Path
+
 import pandas as pd
+from latex import compile_latex
 
 from matbench.reports import switches
 from matbench.results.ablation import COLUMNS
@@ -8,7 +12,24 @@ from matbench.results.ablation import COLUMNS
 
 def table() -> pd.DataFrame:
     rows = [
-        ("m", "pairs", "all", "some_x&50%", region, "total_bad_1", "%", -1.234, -2.0, -0.5, -1.5, 8, "lower", 100.0)
+        (
+            "m",
+            "pairs",
+            "all",
+            "some_x&50%",
+            region,
+            "total_bad_1",
+            "%",
+            -1.234,
+            -2.0,
+            -0.5,
+            -1.5,
+            8,
+            0.01,
+            "lower",
+            nan,
+            100.0,
+        )
         for region in ("nonocc", "all", "occ")
     ]
     rows += [
@@ -21,11 +42,13 @@ def table() -> pd.DataFrame:
             "avg",
             "px",
             0.5,
-            float("nan"),
-            float("nan"),
-            float("nan"),
+            nan,
+            nan,
+            nan,
             1,
+            0.5,
             "x",
+            nan,
             100.0,
         )
     ]
@@ -48,6 +71,10 @@ def test_latex_has_the_same_numbers_and_no_bare_marks() -> None:
     assert text.count("$-$1.23 & $-$2.00 .. $-$0.50 & 8 & lower") == 3
     assert text.count(r"pairs all $\to$ some\_x\&50\% &") == 3
     assert "→" not in text
+
+
+def test_latex_compiles(tmp_path: Path) -> None:
+    compile_latex(switches.latex(table()), tmp_path)
 
 
 def test_the_forest_has_a_line_per_region() -> None:

@@ -129,3 +129,17 @@ def test_all_tables_at_once_are_those_made_alone(report: Report) -> None:
     again = pd.concat([report.results, report.results.iloc[:40].assign(seed=1, value=np.nan)])
     for (metric, region), table in tables.every_scene(again).items():
         pd.testing.assert_frame_equal(table, tables.per_scene(again, region, metric), check_names=False)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_means_over_scenes_are_those_that_pandas_makes(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    scenes, methods = tuple(f"s{k}" for k in range(9)), ("a", "b", "c")
+    table = pd.DataFrame(random.normal(size=(9, 3)), index=list(scenes), columns=list(methods))
+    table = table.where(random.random((9, 3)) > 0.1)
+    table.loc["s4"] = np.nan
+    has = {m: frozenset(s for s in scenes if random.random() > 0.2) for m in methods}
+    scope = tables.Shared(methods, scenes, has, tuple(s for s in scenes if all(s in of for of in has.values())))
+    filled = table.notna().any(axis=1)
+    twin = {m: table.loc[[s for s in scope.counted(m) if filled[s]], m].mean(skipna=False) for m in methods}
+    pd.testing.assert_series_equal(tables.over_scenes(table[::-1], scope), pd.Series(twin), check_exact=True)

@@ -72,6 +72,23 @@ def test_names_of_methods_are_not_broken_in_80_columns() -> None:
     assert "mine[share=0.25] " in text.split("in 'all'")[0]
 
 
+def test_heads_of_methods_are_whole_or_numbers() -> None:
+    """The methods of a newcomer's first run, side by side: a name that is cut off is no name."""
+    names = [
+        "materiality",
+        "multiview_sgm",
+        "guided_filter",
+        "sgbm",
+        "kang_szeliski",
+        "okutomi_kanade",
+        "voxel_coloring",
+    ]
+    text = printed(80, *run_of("total_bad_1", {name: 10.0 + place for place, name in enumerate(names)}))
+    by_scene = text.partition("scene by scene")[2]
+    parts = {part for name in names for part in name.split("_")}
+    assert "#1" in by_scene or all(part in by_scene for part in parts)
+
+
 def test_regions_over_all_views_have_a_table_of_their_own() -> None:
     values = {"materiality": 1.5, "okutomi_kanade": 2.5}
     run = run_of("total_bad_1", values, (*REGIONS, *tables.VIEWS))
@@ -99,3 +116,17 @@ def test_cells_that_fail_alike_share_a_row() -> None:
     assert text.count("no digits") == 1
     assert "cells/0000000000000000/log.txt" in "".join(text.split()), "that of the first"
     assert "timeout" in text
+
+
+def test_further_metrics_and_regions_of_the_scenes_own_have_tables() -> None:
+    results, cells = run_of("good_1", {"low": 97.46, "high": 98.86}, (*REGIONS, "planes"))
+    text = printed(80, results, cells, "good_1", "higher")
+    assert "by the scenes' own regions" in " ".join(text.split())
+    assert "by metric" not in text, "there is one metric only"
+    console = Console(width=80, file=io.StringIO())
+    for table in terminal.tables(results, cells, "good_1", "higher", 80, {"avg": "lower", "not_there": "lower"}):
+        console.print(table)
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    rows = text[text.index("by metric, in 'all'") :].splitlines()
+    assert next(line for line in rows if line.strip().startswith("high")).split() == ["high", "98.86", "98.86"]
+    assert "not" not in text.split("by metric")[1].split("scene by scene")[0]

@@ -110,3 +110,10 @@ def test_nothing_to_ablate_is_said() -> None:
         check_varies([method("all", 3)], ["synthetic/box[noise=0,4]"])
     check_varies([method("all", 3), method("some", 3)], [])
     check_varies([method("all", 3)], ["synthetic/box[noise=0,4,8]"])
+
+
+@pytest.mark.parametrize("cells", [0, 1])
+def test_what_an_early_interruption_leaves_tells_no_effect(cells: int) -> None:
+    methods = [method("all", 3), method("some", 3)]
+    plan, results = run(methods, {(m.changed, f"s{i}"): float(i) for m in methods for i in range(8)})
+    assert ablation(plan, results[:cells]).empty

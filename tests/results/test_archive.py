@@ -12,6 +12,8 @@ from finished_runs import done
 from typing_commands import run
 
 from matbench.errors import UserError
+from matbench.results import archive as archives
+from matbench.results import freshness
 from matbench.results.archive import export, unpack
 
 
@@ -122,3 +124,15 @@ def test_links_are_not_exported_and_stale_runs_are_refused(tmp_path: Path) -> No
     with pytest.raises(UserError, match="not as they were written: type matbench score"):
         export(folder)
     assert (tmp_path / "thesis.zip").read_bytes() == b"mine"
+
+
+def test_of_a_run_that_is_read_only_it_is_said_how_its_tables_are_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Simulated: for root everything is writable."""
+    folder = done(tmp_path / "my run", "flat")
+    (folder / "results.csv").write_text("by hand")
+    for module in (archives, freshness):
+        monkeypatch.setattr(module, "is_writable", lambda path: path != folder)
+    with pytest.raises(UserError, match=r"type matbench score '.*/my run' --out NEW and export that$"):
+        export(folder)

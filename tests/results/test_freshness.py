@@ -100,7 +100,7 @@ def test_a_map_that_changes_after_it_was_scored_is_not_drawn(tmp_path: Path) -> 
 
 def test_tables_say_how_they_were_made(tmp_path: Path) -> None:
     ready = comparison.prepare(["flat", "noise"], "synthetic/box[size=48x36]", out=tmp_path / "run", plugin=METHODS)
-    assert "none that say" in freshness.fault(ready.plan, ready.store)
+    assert "nothing says" in freshness.fault(ready.plan, ready.store)
     ready.run()
     ready.tables()
     assert freshness.fault(ready.plan, ready.store) == ""

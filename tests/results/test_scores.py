@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from attrs import evolve
-from compared import SMALL, cells, compare
+from compared import SMALL, cells, compare, scored
 from places import METHODS
 
 import matbench
@@ -19,13 +19,14 @@ from matbench.regions import REGIONS
 from matbench.results import scores
 from matbench.results.scores import RESULT_COLUMNS
 from matbench.runs import store
+from matbench.runs.cell_files import Solved
 from matbench.space import DisparitySpace
 
 TINY = "synthetic/box[size=48x36]"
 
 
 def test_results_are_tidy_and_exact(tmp_path: Path) -> None:
-    results = compare(tmp_path, "flat[value=2]")
+    results = scored(tmp_path, "flat[value=2]")
     assert tuple(results.columns) == RESULT_COLUMNS
     scene = matbench.load_scene(SMALL)
     error = np.abs(2 - scene.truth[scene.ref].astype(float)) * scene.pair_steps
@@ -46,7 +47,7 @@ def test_results_are_tidy_and_exact(tmp_path: Path) -> None:
 
 
 def test_an_empty_map_is_totally_bad(tmp_path: Path) -> None:
-    results = compare(tmp_path, "empty")
+    results = scored(tmp_path, "empty")
     every = results[results.region == "all"].set_index("metric").value
     assert every["total_bad_1"] == every["invalid"] == 100
     assert every["bad_1"] == 0
@@ -58,40 +59,40 @@ def _rows(results: pd.DataFrame, metric: str, region: str = "all") -> pd.Series:
 
 
 def test_volumes_are_kept_on_request_only_and_then_scored(tmp_path: Path) -> None:
-    plain = compare(tmp_path, "solid", "flat")
+    plain = scored(tmp_path, "solid", "flat")
     run = tmp_path / "run"
     place = {name: run / "cells" / key for name, key in cells(tmp_path).cell.items()}
     assert "surface_f_1" not in set(plain.metric)
     assert not (place["solid"] / "volume.npz").exists()
     flat = (place["flat"] / "cell.json").stat().st_mtime_ns
 
-    scored = compare(tmp_path, "solid", "flat", volumes=True)  # the same run, solved again where there is a volume
+    with_volume = compare(tmp_path, "solid", "flat", volumes=True)  # the same run, solved again where there is a volume
     assert (place["flat"] / "cell.json").stat().st_mtime_ns == flat
-    assert set(_rows(scored, "surface_recall_1").index) == {"solid"}
+    assert set(_rows(with_volume, "surface_recall_1").index) == {"solid"}
     scene = matbench.load_scene(SMALL)
     truth = scene.truth[scene.ref].astype(float)
     space = DisparitySpace.covering(scene.disparities, 5, 72, 96)
     middle = float(space.disparities[space.planes // 2])
     near = np.abs(truth - middle) <= 1 + 1e-4
-    assert _rows(scored, "surface_recall_1")["solid"] == pytest.approx(100 * near.mean())
-    assert _rows(scored, "surface_precision_1")["solid"] == pytest.approx(
+    assert _rows(with_volume, "surface_recall_1")["solid"] == pytest.approx(100 * near.mean())
+    assert _rows(with_volume, "surface_precision_1")["solid"] == pytest.approx(
         100 * near.sum() / (near | (truth < middle)).sum()
     )
-    assert 0 < _rows(scored, "brier", "half_occluded")["solid"] < 1
+    assert 0 < _rows(with_volume, "brier", "half_occluded")["solid"] < 1
     curve = pd.read_csv(run / "reliability.csv")
     assert set(curve.materiality.round(3)) == {0, 0.502}  # 128 of 255
     assert "Calibration of materialities" in (run / "report.html").read_text()
 
     before = (place["solid"] / "cell.json").stat().st_mtime_ns
-    again = compare(tmp_path, "solid", "flat", volumes=True)
+    again = scored(tmp_path, "solid", "flat", volumes=True)
     assert (place["solid"] / "cell.json").stat().st_mtime_ns == before, "nothing is computed twice"
-    pd.testing.assert_frame_equal(again, scored)
+    pd.testing.assert_frame_equal(again, with_volume)
     (place["solid"] / "volume.npz").write_bytes(b"junk")
-    pd.testing.assert_frame_equal(compare(tmp_path, "solid", "flat", volumes=True), scored)
+    pd.testing.assert_frame_equal(scored(tmp_path, "solid", "flat", volumes=True), with_volume)
 
 
 def test_what_is_no_materiality_is_said_and_costs_nothing_else(tmp_path: Path) -> None:
-    results = compare(tmp_path, "solid[material=1.5]", volumes=True)
+    results = scored(tmp_path, "solid[material=1.5]", volumes=True)
     found = cells(tmp_path)
     assert found.status["solid"] == "ok"
     assert "surface_f_1" not in set(results.metric)
@@ -106,7 +107,7 @@ def test_what_is_no_materiality_is_said_and_costs_nothing_else(tmp_path: Path) -
 
 def test_predictions_are_scored_with_and_without_truth(tmp_path: Path) -> None:
     held = "synthetic/box[predict=right size=96x72]"
-    results = compare(tmp_path, "flat[value=2]", "flat[value=4]", "empty", scene=held)
+    results = scored(tmp_path, "flat[value=2]", "flat[value=4]", "empty", scene=held)
     predicted = results[results.metric == "prediction_psnr"]
     assert set(predicted.view) == {"4"}
     assert set(predicted.region) == {"all"}
@@ -139,9 +140,9 @@ def test_no_more_maps_are_held_than_two_however_many_cells_there_are(
     most = 0
     original = store.Store.read
 
-    def read(self: store.Store, cell: Any) -> store.Solved:
+    def read(self: store.Store, *asked: Any) -> Solved:
         nonlocal most
-        found = original(self, cell)
+        found = original(self, *asked)
         alive.add(found)
         most = max(most, len(alive))
         return found

@@ -166,7 +166,7 @@ def test_names_that_are_no_selectors_are_scenes_all_the_same() -> None:
     plan, results = run([method(window=w) for w in (1, 2, 3)], ["d/s0"], lambda *_: 1.0)
     odd = Plan(tuple(Cell(c.method, "d/a b[", "", 0, "") for c in plan.cells))
     (sweep,) = sweeps(odd, results.assign(scene="d/a b["))
-    assert sweep.scenes == ("d/a b[",)
+    assert sweep.scenes == ('"d/a b["',), "as it would be asked for"
 
 
 def test_patterns_that_sweep_are_known_before_anything_runs() -> None:

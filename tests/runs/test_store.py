@@ -1,38 +1,45 @@
 """The folder of a run: its plan, its cells, and whatever is wrong with them."""
 
+import errno
 import json
 import os
 import shutil
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from attrs import evolve
-from compared import SMALL, cells, compare
+from compared import SMALL, cells, scored
 from launcher import SCENE
 from places import METHODS
+from refusing import refusing
 from resuming import finished
 
 from matbench import comparison
 from matbench.errors import UserError
+from matbench.files import plain
 from matbench.plans.settings import Settings
 from matbench.results.status import prune, standing
-from matbench.runs.store import FolderLost
+from matbench.runs.stopped import FolderLost
+from matbench.runs.store import Store
 
 
 def test_half_a_cell_is_no_cell(tmp_path: Path) -> None:
-    compare(tmp_path, "flat")
+    scored(tmp_path, "flat")
     run = tmp_path / "run"
     (run / "cells" / cells(tmp_path).cell["flat"] / "cell.json").write_text('{"outcome": {"sta')
     scores = (run / "results.csv").read_bytes()
-    compare(tmp_path, "flat")
+    scored(tmp_path, "flat")
     assert (run / "results.csv").read_bytes() == scores
     assert cells(tmp_path).status["flat"] == "ok"
 
 
 @pytest.mark.parametrize("damage", ["missing", "junk", "pickled", "shape"])
 def test_damaged_maps_are_computed_anew(tmp_path: Path, damage: str) -> None:
-    compare(tmp_path, "flat")
+    scored(tmp_path, "flat")
     run = tmp_path / "run"
     scores = (run / "results.csv").read_bytes()
     maps = run / "cells" / cells(tmp_path).cell["flat"] / "disparity.npz"
@@ -44,7 +51,7 @@ def test_damaged_maps_are_computed_anew(tmp_path: Path, damage: str) -> None:
         np.savez(maps, view_2=np.array([{"a": 1}], object))
     else:
         np.savez(maps, view_2=np.zeros(3, np.float32))
-    compare(tmp_path, "flat")
+    scored(tmp_path, "flat")
     assert (run / "results.csv").read_bytes() == scores
 
 
@@ -64,12 +71,12 @@ def test_a_hostile_plan_is_refused(tmp_path: Path, damage: str) -> None:
 
 
 def test_recordings_are_written_on_request_and_found_by_name(tmp_path: Path) -> None:
-    compare(tmp_path, "flat", "noise")
-    store = comparison.Store(tmp_path / "run")
+    scored(tmp_path, "flat", "noise")
+    store = Store(tmp_path / "run")
     with pytest.raises(UserError, match="has no recordings"):
         store.recording()
     scores = (tmp_path / "run" / "results.csv").read_bytes()
-    compare(tmp_path, "flat", "noise", record=True)
+    scored(tmp_path, "flat", "noise", record=True)
     assert (tmp_path / "run" / "results.csv").read_bytes() == scores
     with pytest.raises(UserError, match="there are 2 recordings: name one of 'flat on"):
         store.recording()
@@ -79,7 +86,7 @@ def test_recordings_are_written_on_request_and_found_by_name(tmp_path: Path) -> 
     assert found.name == "recording.rrd"
     assert store.recording(found.parent.name) == found
     before = found.stat().st_mtime_ns
-    compare(tmp_path, "flat", "noise", record=True)
+    scored(tmp_path, "flat", "noise", record=True)
     assert found.stat().st_mtime_ns == before
 
 
@@ -96,7 +103,7 @@ def test_a_file_system_that_is_lost_is_not_taken_for_an_empty_one(
         raise OSError(116, "Stale file handle")
 
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "read_text", lost)
+        patch.setattr(plain, "open_plain", lost)
         with pytest.raises(FolderLost, match="Stale file handle"):
             ready.pending()
     assert not ready.pending().cells
@@ -159,7 +166,12 @@ def test_names_with_separators_stay_inside(tmp_path: Path) -> None:
         comparison.prepare("flat", SCENE, out=tmp_path / "run", plugin=plugin)
     ready = comparison.prepare("flat", SCENE, out=tmp_path / "run", plugin=METHODS)
     facts = json.loads((tmp_path / "run" / "plan.json").read_text())
-    for change in ({"key": "../../../evil/key"}, {"key": "0123456789ABCDEF"}, {"scene": "synthetic/box\x1b[2J"}):
+    for change in (
+        {"key": "../../../evil/key"},
+        {"key": "0123456789ABCDEF"},
+        {"scene": "synthetic/box\x1b[2J"},
+        {"scene": "a" * 5000},
+    ):
         (tmp_path / "run" / "plan.json").write_text(json.dumps({**facts, "cells": [{**facts["cells"][0], **change}]}))
         with pytest.raises(UserError, match="is damaged"):
             standing(tmp_path / "run")
@@ -173,7 +185,7 @@ def test_names_with_separators_stay_inside(tmp_path: Path) -> None:
     (place / "cell.json").write_text(spelled % "1")
     told = ready.store.outcome(ready.plan.cells[0])
     assert told is not None
-    assert told.reason == "one [2J two"
+    assert told.reason == "one two"
     (place / "cell.json").write_text('{"outcome": {"status": "ok"}}')
     marker = tmp_path / "executed"
     np.savez(place / "disparity.npz", view_2=np.array([_Malice(str(marker))], object))
@@ -189,3 +201,30 @@ class _Malice:
 
     def __reduce__(self) -> tuple[object, tuple[str]]:
         return os.mkdir, (self.path,)
+
+
+TRY = "import sys; from pathlib import Path; from matbench.runs.store import Store; Store(Path(sys.argv[1])).try_out()"
+
+
+def test_a_file_system_that_does_not_tell_when_files_are_on_the_disk_is_not_taken_for_a_full_one(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "run" / "cells").mkdir(parents=True)
+    line = [sys.executable, "-c", TRY, str(tmp_path / "run")]
+    for number, is_lost in ((errno.EINVAL, False), (errno.ENOSPC, True)):
+        environment = refusing(tmp_path, tmp_path / "run", {"fsync": number})
+        done = subprocess.run(line, env=environment, capture_output=True, text=True)
+        assert bool(done.returncode) == is_lost, done.stderr
+        assert ("FolderLost" in done.stderr) == is_lost
+
+
+def test_a_plan_of_a_hundred_thousand_faults_is_refused_at_the_first(tmp_path: Path) -> None:
+    ready = comparison.prepare(["flat"], SMALL, out=tmp_path / "run", plugin=[METHODS])
+    path = tmp_path / "run" / "plan.json"
+    plan = json.loads(path.read_text())
+    plan["cells"] = [{"key": "0" * 16}] * 100_000
+    path.write_text(json.dumps(plan))
+    began = time.process_time()
+    with pytest.raises(UserError, match="is not a plan"):
+        Store(ready.store.folder).plan()
+    assert time.process_time() - began < 2, "a note for each of them takes ten seconds"

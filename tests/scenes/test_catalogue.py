@@ -11,8 +11,10 @@ import pytest
 from matbench import comparison
 from matbench.errors import UserError
 from matbench.files.own_folders import data_folder
+from matbench.plans import plugins
 from matbench.plans.settings import Settings
-from matbench.scenes.catalogue import DATA_VARIABLE, data_root, load_scene, select
+from matbench.scenes.catalogue import DATA_VARIABLE, data_root, is_pattern, listings, load_scene, select, sets
+from matbench.scenes.dataset import Listing
 
 
 def write(folder: Path, *names: str) -> None:
@@ -125,3 +127,37 @@ def test_compare_says_which_scenes_of_a_pattern_it_goes_without(root: Path) -> N
     done = subprocess.run([*line, "--data", str(root)], cwd=root, capture_output=True, text=True, timeout=120)
     assert "without middlebury2006/Baby1: not there in size half" in done.stdout, done.stderr
     assert done.returncode == 0, done.stdout
+
+
+def test_a_set_stands_for_its_scenes_in_order() -> None:
+    """With its options put over theirs; no pattern matches what has no end."""
+    quick = select("worlds/quick").names
+    assert len(quick) == 12
+    assert quick[:2] == ("synthetic/world-0[size=160x120]", "synthetic/world-1[size=160x120]")
+    assert select("worlds/quick[noise=4 size=80x60]").names[1] == "synthetic/world-1[size=80x60 noise=4]"
+    assert select(["synthetic/box", "worlds/quick"]).names == ("synthetic/box", *quick)
+    assert (is_pattern("worlds/quick"), is_pattern("worlds/none"), is_pattern("synthetic/box")) == (True, False, False)
+    assert not any("world" in name for name in select("synthetic/*").names)
+    listing = listings()["synthetic/world"]
+    assert isinstance(listing, Listing)
+    assert listing.endless
+    with pytest.raises(UserError, match="worlds/quick is a set of 12 scenes: name one of them"):
+        load_scene("worlds/quick")
+    with pytest.raises(UserError, match="dataset 'worlds'"):
+        load_scene("worlds/none")
+
+
+def test_a_set_of_ones_own(tmp_path: Path) -> None:
+    """A dataset declares sets; one that fails harms no other, and none takes the name of another."""
+    (tmp_path / "mine.py").write_text(
+        "class Rooms:\n"
+        "    def listings(self, root): return []\n"
+        "    def load(self, name, options, root): raise NotImplementedError\n"
+        "    def sets(self): return {'mine/small': ['rooms/a', 'rooms/b[x=1]'], 'paper': []}\n"
+        "class Odd(Rooms):\n"
+        "    def sets(self): raise ValueError('no')\n"
+    )
+    with plugins.using([tmp_path / "mine.py"]):
+        assert select("mine/small[y=2]").names == ("rooms/a[y=2]", "rooms/b[x=1 y=2]")
+        assert len(sets()["paper"]) == 3
+        assert len(sets()["worlds/quick"]) == 12

@@ -26,7 +26,7 @@ class Broken(Desk):
 
 def test_a_class_is_called_and_anything_else_is_the_dataset() -> None:
     assert isinstance(loaded(Plugin("desk", "own.py", Desk)), Desk)
-    entry = type("Entry", (), {"load": lambda self: made})()
+    entry = type("Entry", (), {"load": lambda self: made, "module": "matbench.scene", "attr": ""})()
     made = Desk()
     assert loaded(Plugin("desk", "a package", entry)) is made
 

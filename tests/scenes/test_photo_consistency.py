@@ -1,10 +1,9 @@
 """Warping by the truth: against a loop over pixels, and on scenes that are and are not what they say."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from attrs import evolve
+from real import Real
 from scene_files import Layers
 
 from matbench import load_scene
@@ -103,9 +102,9 @@ def test_what_is_left_over_is_where_the_truth_is_wrong() -> None:
         "hci/antinous",
     ],
 )
-def test_every_real_truth_explains_its_images(data_root: Path, name: str) -> None:
+def test_every_real_truth_explains_its_images(real: Real, name: str) -> None:
     """In both views that have truth; every third row. (Full-size Reindeer, left out for its size, is explained too.)"""
-    scene = load_scene(name, data_root)
+    scene = load_scene(name, real(name))
     for view, truth in scene.truth.items():
         thin = evolve(scene, ref=view, views=scene.views[:, ::3], truth={view: truth[::3]}, regions={})
         error = together(warping_errors(thin))

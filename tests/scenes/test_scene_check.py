@@ -1,11 +1,11 @@
 """Checking a scene: each fault is told, and nothing is told of a scene without one."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 from attrs import evolve
+from real import Real
 
 from matbench import load_scene
 from matbench.scene import Range, Scene
@@ -46,8 +46,8 @@ def test_a_good_scene_has_no_problem(name: str) -> None:
 @pytest.mark.parametrize(
     "name", ["middlebury2001/tsukuba", "middlebury2001/sawtooth", "middlebury2006/Plastic", "hci/antinous"]
 )
-def test_real_scenes_have_no_problem(data_root: Path, name: str) -> None:
-    found = list(check(load_scene(name, data_root)))
+def test_real_scenes_have_no_problem(real: Real, name: str) -> None:
+    found = list(check(load_scene(name, real(name))))
     assert {finding.verdict for finding in found} == {"good"}, found
     assert {"order", "shift", "rows"} < {finding.topic for finding in found}
 

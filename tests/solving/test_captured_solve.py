@@ -50,7 +50,7 @@ def test_what_goes_wrong_is_one_line_that_names_the_cell(tmp_path: Path) -> None
     names = {
         "raises": "failed: ArithmeticError: the third digit is missing and more",
         "declines": "was skipped: only scenes with a hundred views",
-        "exits": "failed: its process has ended",
+        "exits": "failed: the method ended its process (exit status 7)",
         "bare": "failed: TypeError: solve returned ndarray",
     }
     ready = comparison.prepare(list(names), SMALL, out=tmp_path / "run", plugin=METHODS)

@@ -11,8 +11,9 @@ from attrs import evolve
 
 from matbench.plans.plan import Cell, Method
 from matbench.plans.settings import Settings
+from matbench.solving import confinement, intake, processes
 from matbench.solving.child import LOG_ENDS, Child, Log
-from matbench.solving.worker import Job, Message
+from matbench.solving.worker import Job, Message, Order
 
 JOB = Job(Path("run"), Cell(Method("flat", {}), "synthetic/box", "", 0, "0" * 16), (), 2, Settings(isolation="shared"))
 
@@ -98,3 +99,34 @@ def test_a_process_suits_jobs_with_the_same_limits_only(child: tuple[Child, Conn
     assert not made.suits(evolve(JOB, threads=1))
     assert not made.suits(evolve(JOB, settings=Settings(isolation="process")))
     assert not made.suits(evolve(JOB, settings=Settings(isolation="shared", memory=64)))
+
+
+@pytest.mark.parametrize("confined", [False, True])
+def test_what_fails_before_the_method_starts_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, confined: bool
+) -> None:
+    def refuse(*_: object) -> None:
+        raise ValueError("No threading layer could be loaded.")
+
+    where, name = (confinement, "shut_in") if confined else (processes, "use_threads")
+    monkeypatch.setattr(where, name, refuse)
+    ours, inbox = Pipe()
+    made = Child.fork(JOB, inbox, confined)
+    try:
+        made.line.send(Order(JOB, tmp_path / "views.npz", tmp_path))
+        assert made.line.poll(60)
+        assert made.messages() == [Message("done", is_fit=False)]
+        log = Log(made.output)
+        log.drain()
+    finally:
+        made.close()
+        os.waitpid(made.pid, 0)
+        ours.close()
+        inbox.close()
+    outcome = intake.outcome(tmp_path)
+    assert (outcome.status, outcome.reason) == (
+        "failed",
+        f"ValueError: No threading layer could be loaded. (test_child.py:{refuse.__code__.co_firstlineno + 1})",
+    )
+    assert b"Traceback" in log.first
+    assert b"No threading layer could be loaded." in log.first

@@ -2,19 +2,31 @@
 
 import os
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
+from forking import in_child
 
 from matbench.plans.plugins import kernel_cache
 from matbench.scenes.catalogue import data_root
 from matbench.solving.environment import kernel_cache_in_use, without_main
 
 
-def test_without_a_home_kernels_are_not_kept_and_there_are_no_scenes(homeless, tmp_path: Path, monkeypatch) -> None:
+def test_without_a_home_there_is_a_place_all_the_same_and_there_are_no_scenes(
+    homeless, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    with kernel_cache_in_use():
-        assert data_root() is None
+    monkeypatch.delenv("MPLCONFIGDIR", raising=False)
+
+    def act() -> list[bool]:
+        warnings.simplefilter("ignore")
+        with kernel_cache_in_use():
+            places = [Path(os.environ["NUMBA_CACHE_DIR"]), Path(os.environ["MPLCONFIGDIR"])]
+            assert data_root() is None
+            return [place.parent.is_dir() for place in places]
+
+    assert in_child(act) == [True, True]
     assert list(tmp_path.iterdir()) == [], "no folder called ~"
 
 
@@ -23,23 +35,15 @@ def test_kernels_are_shared_within_the_block_only(
     before: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR"):
+        monkeypatch.delenv(name, raising=False)
     if before is not None:
         monkeypatch.setenv("NUMBA_CACHE_DIR", before)
     with kernel_cache_in_use():
         assert os.environ["NUMBA_CACHE_DIR"] == str(kernel_cache())
         assert kernel_cache().is_dir()
+        assert "MPLCONFIGDIR" not in os.environ, "the person's own is used"
     assert os.environ.get("NUMBA_CACHE_DIR") == before
-
-
-def test_where_no_folder_can_be_made_each_process_compiles_for_itself(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    with kernel_cache_in_use():
-        assert "NUMBA_CACHE_DIR" not in os.environ
 
 
 def test_the_main_script_is_hidden_within_the_block_only() -> None:

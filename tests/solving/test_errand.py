@@ -33,12 +33,15 @@ def test_it_ends_in_time_or_when_nobody_wants_it(tmp_path: Path) -> None:
         (tmp_path / "pid").write_text(str(os.getpid()))
         time.sleep(60)
 
-    begin = time.monotonic()
-    with pytest.raises(errand.Late):
-        errand.run(dawdles, inbox, time.monotonic() + 0.5)
+    for seconds in (0.5, 5, 25):
+        begin = time.monotonic()
+        with pytest.raises(errand.Late):
+            errand.run(dawdles, inbox, begin + seconds)
+        if (tmp_path / "pid").exists():  # on a busy machine, it may not have come so far
+            break
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
     other.close()
     with pytest.raises(EOFError):
         errand.run(dawdles, inbox, None)
-    assert time.monotonic() - begin < 20
+    assert time.monotonic() - begin < 55, "it would have slept for sixty"

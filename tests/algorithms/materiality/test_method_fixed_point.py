@@ -177,6 +177,15 @@ def test_every_switch_changes_something(change):
         assert not np.array_equal(one.volume.values, other.volume.values)
 
 
+def test_confidence_is_by_materiality_by_costs_or_their_product():
+    found = {name: solved(Materiality(confidence=name)) for name in ("materiality", "costs", "both")}
+    sure = {name: estimate.confidence[1] for name, estimate in found.items()}
+    maps = [estimate.disparity[1] for estimate in found.values()]
+    assert all(np.array_equal(maps[0], other) for other in maps[1:]), "it changes no answer"
+    np.testing.assert_allclose(sure["both"], sure["materiality"] * sure["costs"], rtol=1e-6)
+    assert not np.array_equal(sure["materiality"], sure["costs"])
+
+
 class Listener(Probe):
     active = True
 

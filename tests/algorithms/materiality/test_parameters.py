@@ -31,6 +31,7 @@ from matbench.spec import parse
         ("adaptive", -1.0),
         ("alike", -1.0),
         ("mending", -1),
+        ("confidence", "chance"),
     ],
 )
 def test_a_wrong_value_names_the_parameter(name, value):
@@ -47,7 +48,10 @@ def test_presets_set_nothing_that_is_not_read(name):
 SILENT = [
     ({}, "count=1.0 counted=global target=union across=1.0 along=1.0 edge=5.0 sharpness=5.0 sigma=5.0 tolerance=0.1"),
     ({"passes": 0}, "material=0.1 tolerance=0.1"),
-    ({"passes": 0, "start": "soft"}, "adaptive=5.0 mending=1 hidden=0.1 small_step=0.1 large_step=2.0 contrast=5.0"),
+    (
+        {"passes": 0, "start": "soft"},
+        "adaptive=5.0 mending=1 hidden=0.1 small_step=0.1 large_step=2.0 contrast=5.0 confidence=both",
+    ),
     ({"window": 1}, "adaptive=5.0"),
     ({"similarity": "ssd"}, "alike=5.0"),
     ({"similarity": "census", "alike": 0.0}, "truncation=5.0 colour=false"),
@@ -58,7 +62,7 @@ SILENT = [
     ),
     ({"optimiser": "fista", "passes": 5, "across": 0.0, "along": 0.0}, "edge=5.0"),
     ({"optimiser": "fista", "passes": 5, "count": 0.0}, "counted=global target=union"),
-    ({"optimiser": "fista", "passes": 2}, "tolerance=0.9"),
+    ({"optimiser": "fista", "passes": 2}, "tolerance=0.9 confidence=materiality"),
 ]
 
 

@@ -188,4 +188,5 @@ def test_wrong_input_is_told_in_one_line(name: str, options: dict[str, str], wor
 
 def test_listings_need_no_data(tmp_path: Path) -> None:
     assert SYNTHETIC.listings(None) == SYNTHETIC.listings(tmp_path)
-    assert {listing.name: listing.present for listing in SYNTHETIC.listings(None)} == dict.fromkeys(WORLDS, True)
+    found = {listing.name: listing.present for listing in SYNTHETIC.listings(None) if not listing.endless}
+    assert found == dict.fromkeys(WORLDS, True)
