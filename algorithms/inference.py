@@ -1,6 +1,6 @@
 """Disparity maps of all views, by semi-global matching and mending: the part that materiality and its control share."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 from attrs import field, frozen, validators
@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from matbench.algorithms.fusion import Fusion
 from matbench.algorithms.mending import mend
+from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import Matcher, Matching
+from matbench.algorithms.surfaces import smoothed
 from matbench.algorithms.windows import Features
 
 
@@ -22,11 +24,15 @@ class Inference:
     mending
         Rounds of mending: a pixel that other views contradict takes the disparity of trusted neighbours of
         its colour (`mend`). 0 = no mending.
+    surfaces
+        Whether unsure pixels of the first maps take the disparities of the surfaces that surer pixels of their
+        colour lie on (`surfaces.smoothed`).
     """
 
     fusion: Fusion = field(factory=Fusion)
     semiglobal: SemiGlobal = field(factory=SemiGlobal)
     mending: int = field(default=3, validator=validators.ge(0))
+    surfaces: bool = True
 
     def silent(self, matching: Matching) -> Mapping[str, str]:
         """Parameter -> what it needs to have an effect, for those without effect at this window size."""
@@ -47,17 +53,31 @@ class Inference:
     ) -> NDArray[np.float32]:
         """(views, H, W) mended maps, as plane indices; costs are from the better half of each point's similarities.
 
+        Unsure pixels lie on the `surfaces` of surer ones.
+
         Parameters
         ----------
         ratios
             (H, W), overwritten if it is given, with how sure the reference view's answers are: the `peak_ratio` of
             their sums of path costs, 0 where mending has moved the answer by more than a pixel of the pair.
         """
+        space, scene = matcher.space, matcher.scene
 
         def cost(one: Matcher, phases: Features) -> NDArray[np.float32]:
             return self.fusion.first_cost(one, threads, phases)
 
-        return self._maps(matcher, cost, threads, ratios=ratios)[0]
+        views = range(space.views) if self.surfaces else (scene.ref,) if ratios is not None else ()
+        maps, sure, _ = self._maps(matcher, cost, threads, views)
+        if ratios is not None:
+            ratios[:] = sure[scene.ref]
+        if self.surfaces:
+            pixels = np.float32(scene.pair_steps / space.fineness)
+
+            def smooth(view: int, _: int) -> None:
+                maps[view] = smoothed(maps[view] * pixels, sure[view], scene.views[view]) / pixels
+
+            over_rows(smooth, space.views, threads, 1)
+        return maps
 
     def refined_maps(
         self,
@@ -69,7 +89,8 @@ class Inference:
     ) -> tuple[NDArray[np.float32], float, float]:
         """The same, with costs from the pairs that see a point if the rays of all views end where `maps` say.
 
-        The cost of a point is that of `Fusion.seen_cost`, plus material (1 - mu).
+        The cost of a point is that of `Fusion.seen_cost`, plus material (1 - mu). These maps are mended alone: the
+        surfaces of the first ones have come in by mu.
 
         Returns
         -------
@@ -83,7 +104,10 @@ class Inference:
             mu *= np.float32(material)
             return np.add(least, mu, out=least)
 
-        found, energies = self._maps(matcher, cost, threads, maps, ratios)
+        reference = () if ratios is None else (matcher.scene.ref,)
+        found, sure, energies = self._maps(matcher, cost, threads, reference, maps)
+        if ratios is not None:
+            ratios[:] = sure[matcher.scene.ref]
         before, after = energies.mean(axis=0)
         return found, float(before), float(after)
 
@@ -92,27 +116,27 @@ class Inference:
         matcher: Matcher,
         cost: Callable[[Matcher, Features], NDArray[np.float32]],
         threads: int,
+        surely: Collection[int],
         known: NDArray[np.float32] | None = None,
-        ratios: NDArray[np.float32] | None = None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    ) -> tuple[NDArray[np.float32], Mapping[int, NDArray[np.float32]], NDArray[np.float64]]:
         """Mended maps of all views, and for each view the energies of the `known` map and of the new one.
 
-        The reference view's `ratios` are written, if there are any (`initial_maps`).
+        Between them: for each view of `surely`, (H, W) how sure its answers are (`initial_maps`).
         """
         space, scene, phases = matcher.space, matcher.scene, matcher.phases()
         maps = np.empty((space.views, space.rows, space.width), np.float32)
+        sure: dict[int, NDArray[np.float32]] = {}
         energies = np.zeros((space.views, 2))
         for view, image in enumerate(scene.views):
             paid = cost(matcher.with_reference(view), phases)
-            surely = ratios is not None and view == scene.ref
-            maps[view], found = self.semiglobal.infer_surely(paid, image, threads, surely)
-            if ratios is not None and found is not None:
-                ratios[:] = found
+            maps[view], ratios = self.semiglobal.infer_surely(paid, image, threads, view in surely)
+            if ratios is not None:
+                sure[view] = ratios
             if known is not None:
                 energies[view] = [self.semiglobal.energy(paid, image, of) for of in (known[view], maps[view])]
         steps = (maps + np.float32(space.first)) / np.float32(space.fineness)
         mended = mend(steps, scene.views, 1 / scene.pair_steps, self.mending, threads)
         planes = np.asarray(mended * np.float32(space.fineness) - np.float32(space.first), np.float32)
-        if ratios is not None:
-            ratios[~(np.abs(mended[scene.ref] - steps[scene.ref]) <= 1 / scene.pair_steps)] = 0
-        return planes, energies
+        for view, ratios in sure.items():
+            ratios[~(np.abs(mended[view] - steps[view]) <= 1 / scene.pair_steps)] = 0
+        return planes, sure, energies

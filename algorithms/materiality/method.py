@@ -39,9 +39,9 @@ class Materiality:
     by projected gradient with the exact derivative (9), and takes the disparities of the reference view from mu.
     The default solver is a fixed-point iteration instead (13-15). The maps of all views say where their rays
     end; V and mu follow from that. Then all maps are inferred again, with costs from the views that see each
-    point. A pass lowers the energy of the maps (`SemiGlobal.energy`) under the costs of that pass. The history
+    point. A pass seeks the maps of least energy (`SemiGlobal.energy`) under the costs of that pass. The history
     holds it as ``energy_before`` and ``energy``, with the share of pixels that ``changed``. Semi-global matching
-    only approximates the minimum, so a pass after the first may end up to 2 % above where it began.
+    only approximates the minimum, so a pass may end up to 2 % above where it began.
     Numbers are those of the equations in docs/concepts/materiality.md.
 
     Its parameters are in four groups, but are given by their own names: ``Materiality(pairs="all", passes=2)``. A

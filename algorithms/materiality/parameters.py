@@ -120,6 +120,7 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
     takes = {
         "adaptive": (infers, inference),
         "mending": (infers, inference),
+        "surfaces": (solver.start == "consensus", "start=consensus"),
         **dict.fromkeys(
             ("hidden", "small_step", "large_step", "contrast"),
             (infers or by_volume, f"{inference} or binarization=volume" if descends else inference),

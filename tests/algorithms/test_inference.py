@@ -8,6 +8,7 @@ from matbench.algorithms.inference import Inference
 from matbench.algorithms.mending import mend
 from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import Matcher, Matching
+from matbench.algorithms.surfaces import smoothed
 from matbench.scene import Range, Scene
 
 
@@ -34,7 +35,7 @@ def mended(matcher, maps, rounds):
 def test_every_view_is_inferred_from_costs_on_its_own_rays(fineness, pair_steps, rounds):
     matcher = moving_plane(fineness=fineness, pair_steps=pair_steps, noise=80, window=3)
     semiglobal, scene = SemiGlobal(large_step=0.5), matcher.scene
-    inference = Inference(semiglobal=semiglobal, mending=rounds)
+    inference = Inference(semiglobal=semiglobal, mending=rounds, surfaces=False)
     views = [matcher.with_reference(view) for view in range(scene.n)]
     first = [semiglobal.infer(Fusion().first_cost(one), scene.views[view]) for view, one in enumerate(views)]
     expected = mended(matcher, np.stack(first), rounds)
@@ -76,3 +77,15 @@ def test_maps_that_are_given_stay_as_they_are():
 def test_a_wrong_value_names_the_parameter():
     with pytest.raises(ValueError, match="mending"):
         Inference(mending=-1)
+
+
+def test_unsure_pixels_of_the_first_maps_lie_on_the_surfaces_of_surer_ones():
+    matcher = moving_plane(fineness=2, pair_steps=3.0, noise=80, window=3)
+    space, scene = matcher.space, matcher.scene
+    pixels = np.float32(scene.pair_steps / space.fineness)
+    rough, sure = Inference(surfaces=False), np.empty((space.rows, space.width), np.float32)
+    for view in range(scene.n):
+        one = matcher.with_reference(view)
+        expected = smoothed(rough.initial_maps(one, 1, sure)[view] * pixels, sure, scene.views[view]) / pixels
+        for threads in (1, 2):
+            np.testing.assert_array_equal(Inference().initial_maps(matcher, threads)[view], expected)
