@@ -1,11 +1,12 @@
 """Disparity maps of all views, by semi-global matching and mending: the part that materiality and its control share."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
+from matbench.algorithms.agreement import agreement
 from matbench.algorithms.fusion import Fusion
 from matbench.algorithms.mending import mend
 from matbench.algorithms.parallel import over_rows
@@ -25,8 +26,8 @@ class Inference:
         Rounds of mending: a pixel that other views contradict takes the disparity of trusted neighbours of
         its colour (`mend`). 0 = no mending.
     surfaces
-        Whether unsure pixels of the first maps take the disparities of the surfaces that surer pixels of their
-        colour lie on (`surfaces.smoothed`).
+        Whether unsure pixels take the disparities of the surfaces that surer pixels of their colour lie on
+        (`surfaces.smoothed`).
     """
 
     fusion: Fusion = field(factory=Fusion)
@@ -61,23 +62,12 @@ class Inference:
             (H, W), overwritten if it is given, with how sure the reference view's answers are: the `peak_ratio` of
             their sums of path costs, 0 where mending has moved the answer by more than a pixel of the pair.
         """
-        space, scene = matcher.space, matcher.scene
 
         def cost(one: Matcher, phases: Features) -> NDArray[np.float32]:
             return self.fusion.first_cost(one, threads, phases)
 
-        views = range(space.views) if self.surfaces else (scene.ref,) if ratios is not None else ()
-        maps, sure, _ = self._maps(matcher, cost, threads, views)
-        if ratios is not None:
-            ratios[:] = sure[scene.ref]
-        if self.surfaces:
-            pixels = np.float32(scene.pair_steps / space.fineness)
-
-            def smooth(view: int, _: int) -> None:
-                maps[view] = smoothed(maps[view] * pixels, sure[view], scene.views[view]) / pixels
-
-            over_rows(smooth, space.views, threads, 1)
-        return maps
+        maps, sure, _ = self._maps(matcher, cost, threads, ratios)
+        return self._on_surfaces(matcher, maps, sure, threads) if self.surfaces else maps
 
     def refined_maps(
         self,
@@ -86,11 +76,13 @@ class Inference:
         material: float,
         threads: int = 1,
         ratios: NDArray[np.float32] | None = None,
+        visibility: bool = True,
     ) -> tuple[NDArray[np.float32], float, float]:
         """The same, with costs from the pairs that see a point if the rays of all views end where `maps` say.
 
-        The cost of a point is that of `Fusion.seen_cost`, plus material (1 - mu). These maps are mended alone: the
-        surfaces of the first ones have come in by mu.
+        The cost of a point is that of `Fusion.seen_cost`, plus material (1 - mu). Without `visibility` it is that of
+        the initial maps, plus the same with mu by `agreement`. Pixels that mending has moved are not put on surfaces:
+        those of the first maps have come in by mu.
 
         Returns
         -------
@@ -99,15 +91,17 @@ class Inference:
         """
 
         def cost(one: Matcher, phases: Features) -> NDArray[np.float32]:
-            least, mu = self.fusion.seen_cost(one, maps, threads, phases)
+            if visibility:
+                least, mu = self.fusion.seen_cost(one, maps, threads, phases)
+            else:
+                least, mu = self.fusion.first_cost(one, threads, phases), agreement(one, maps, threads)
             np.subtract(1, mu, out=mu)
             mu *= np.float32(material)
             return np.add(least, mu, out=least)
 
-        reference = () if ratios is None else (matcher.scene.ref,)
-        found, sure, energies = self._maps(matcher, cost, threads, reference, maps)
-        if ratios is not None:
-            ratios[:] = sure[matcher.scene.ref]
+        found, sure, energies = self._maps(matcher, cost, threads, ratios, maps)
+        if self.surfaces:
+            found = np.where(sure > 0, self._on_surfaces(matcher, found, sure, threads), found)
         before, after = energies.mean(axis=0)
         return found, float(before), float(after)
 
@@ -116,27 +110,47 @@ class Inference:
         matcher: Matcher,
         cost: Callable[[Matcher, Features], NDArray[np.float32]],
         threads: int,
-        surely: Collection[int],
+        ratios: NDArray[np.float32] | None,
         known: NDArray[np.float32] | None = None,
-    ) -> tuple[NDArray[np.float32], Mapping[int, NDArray[np.float32]], NDArray[np.float64]]:
-        """Mended maps of all views, and for each view the energies of the `known` map and of the new one.
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]:
+        """Mended maps of all views, how sure they are, and the energies of the `known` maps and of the new ones.
 
-        Between them: for each view of `surely`, (H, W) how sure its answers are (`initial_maps`).
+        How sure a view is of its answers is known where it is asked: (views, H, W), or none. The reference view's are
+        `ratios`, if there are any (`initial_maps`).
         """
         space, scene, phases = matcher.space, matcher.scene, matcher.phases()
         maps = np.empty((space.views, space.rows, space.width), np.float32)
-        sure: dict[int, NDArray[np.float32]] = {}
+        sure = np.empty_like(maps) if self.surfaces else maps[:0]
         energies = np.zeros((space.views, 2))
         for view, image in enumerate(scene.views):
             paid = cost(matcher.with_reference(view), phases)
-            maps[view], ratios = self.semiglobal.infer_surely(paid, image, threads, view in surely)
-            if ratios is not None:
-                sure[view] = ratios
+            asked = self.surfaces or (ratios is not None and view == scene.ref)
+            maps[view], found = self.semiglobal.infer_surely(paid, image, threads, asked)
+            if found is not None and ratios is not None and view == scene.ref:
+                ratios[:] = found
+            if found is not None and self.surfaces:
+                sure[view] = found
             if known is not None:
                 energies[view] = [self.semiglobal.energy(paid, image, of) for of in (known[view], maps[view])]
         steps = (maps + np.float32(space.first)) / np.float32(space.fineness)
         mended = mend(steps, scene.views, 1 / scene.pair_steps, self.mending, threads)
         planes = np.asarray(mended * np.float32(space.fineness) - np.float32(space.first), np.float32)
-        for view, ratios in sure.items():
-            ratios[~(np.abs(mended[view] - steps[view]) <= 1 / scene.pair_steps)] = 0
+        moved = ~(np.abs(mended - steps) <= 1 / scene.pair_steps)
+        if ratios is not None:
+            ratios[moved[scene.ref]] = 0
+        sure[moved[: len(sure)]] = 0
         return planes, sure, energies
+
+    @staticmethod
+    def _on_surfaces(
+        matcher: Matcher, maps: NDArray[np.float32], sure: NDArray[np.float32], threads: int
+    ) -> NDArray[np.float32]:
+        """(views, H, W) the maps `smoothed` in pixels of the field's pair."""
+        scene, out = matcher.scene, np.empty_like(maps)
+        pixels = np.float32(scene.pair_steps / matcher.space.fineness)
+
+        def smooth(view: int, _: int) -> None:
+            out[view] = smoothed(maps[view] * pixels, sure[view], scene.views[view]) / pixels
+
+        over_rows(smooth, len(maps), threads, 1)
+        return out

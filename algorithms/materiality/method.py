@@ -111,7 +111,9 @@ class Materiality:
             # a view in which nothing is material ends in the farthest plane
             maps = np.nan_to_num(np.stack([fill_from_background(found) for found in rays]))
         for number in range(solver.passes):
-            found, *energies = inference.refined_maps(matcher, maps, solver.material, threads, ratios)
+            found, *energies = inference.refined_maps(
+                matcher, maps, solver.material, threads, ratios, solver.visibility
+            )
             compared += every
             changed = float(np.mean(np.abs(found - maps) > 0.5))
             told = dict(zip(history, (changed, *energies), strict=True))

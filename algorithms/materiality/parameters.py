@@ -46,6 +46,10 @@ class Solver:
         (sum V_ij (1 - rho_ij) + 0.25 hidden) / (sum V_ij + 0.25) + material (1 - mu), V_ij being the
         product of the visibilities of the pair's views other than the reference; at the fixed point
         the maps of the last pass are the answer.
+    visibility
+        At the fixed point, whether V says which pairs and rays count at a point. If not, whatever has it in its frustum
+        does: costs are those of the start, from the better half of the similarities, and mu is the share of all rays
+        through the point that end there.
     material
         Weight of mu in the cost of a point, wherever disparities are inferred semi-globally by it.
     confidence
@@ -61,6 +65,7 @@ class Solver:
     passes: int = field(default=1, validator=validators.ge(0))
     tolerance: float = field(default=0.0, validator=validators.ge(0))
     binarization: Binarization = field(default="volume", validator=validators.in_(get_args(Binarization)))
+    visibility: bool = True
     material: float = field(default=0.25, validator=validators.ge(0))
     confidence: Confidence = field(default="costs", validator=validators.in_(get_args(Confidence)))
 
@@ -120,7 +125,7 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
     takes = {
         "adaptive": (infers, inference),
         "mending": (infers, inference),
-        "surfaces": (solver.start == "consensus", "start=consensus"),
+        "surfaces": (infers, inference),
         **dict.fromkeys(
             ("hidden", "small_step", "large_step", "contrast"),
             (infers or by_volume, f"{inference} or binarization=volume" if descends else inference),
@@ -131,6 +136,7 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
             "optimiser=fixed_point" if descends else inference,
         ),
         "tolerance": (solver.passes >= fewest, f"passes above {fewest - 1}"),
+        "visibility": (some and not descends, "optimiser=fixed_point" if descends else "passes above 0"),
         "material": (by_volume if descends else some, "binarization=volume" if descends else "passes above 0"),
         "target": (
             solver.binarization == "plane" or (minimises and energy.count > 0),

@@ -1,5 +1,6 @@
 """The control of materiality: the same settings and similarities, and no more."""
 
+import numpy as np
 import pytest
 from attrs import asdict, evolve
 from boxes import FISTA, box_before_wall
@@ -24,6 +25,24 @@ def test_the_control_shares_settings_and_similarities():
         assert (work["passes"], work["pair_similarities"]) == (passes, (1 + passes) * plain)
     soft, consensus = (evolve(FISTA, start=start).solve(scene, Context()).work for start in ("soft", "consensus"))
     assert consensus["pair_similarities"] == soft["pair_similarities"] + plain
+
+
+def test_materiality_without_visibility_and_without_mu_is_the_control():
+    scene, context = box_before_wall(), Context()
+    control = MultiviewSGM(surfaces=False).solve(scene, context)
+    answers = {
+        (visibility, material): Materiality(surfaces=False, visibility=visibility, material=material).solve(
+            scene, context
+        )
+        for visibility in (True, False)
+        for material in (0.25, 0.0)
+    }
+    neither = answers[False, 0.0]
+    for found, expected in [(neither.disparity, control.disparity), (neither.confidence, control.confidence)]:
+        np.testing.assert_array_equal(found[scene.ref], expected[scene.ref])
+    maps = [answer.disparity[scene.ref] for answer in answers.values()]
+    for i, one in enumerate(maps):
+        assert not any(np.array_equal(one, other) for other in maps[:i])
 
 
 def test_the_control_refuses_what_it_does_not_read():

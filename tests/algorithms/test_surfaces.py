@@ -5,10 +5,8 @@ from numpy.typing import NDArray
 from matbench.algorithms.surfaces import (
     ACROSS,
     COLOUR,
-    FITS,
     JUMP,
     NEAR,
-    OUTLIER,
     REACH,
     ROUNDS,
     STEADY,
@@ -58,19 +56,14 @@ def slow_fit(found: NDArray[np.float32], sure: NDArray[np.float32], image: NDArr
     """The twin of `fitted`: the weights of all pairs of pixels, and a regression at each."""
     weights = path_weights(image, found)
     places, values = np.argwhere(np.ones(found.shape, bool)).astype(float), found.ravel().astype(float)
-    trust, planes = sure.ravel().astype(float), values
-    for _ in range(FITS):
-        new = np.empty_like(values)
-        for p in range(values.size):
-            w = weights[p] * trust
-            w /= w.sum()
-            away = places - places[p]
-            middle, value = w @ away, w @ values
-            spread = (w[:, None] * (away - middle)).T @ (away - middle) + STEADY * np.eye(2)
-            slope = np.linalg.solve(spread, (w * (values - value)) @ (away - middle))
-            new[p] = value - slope @ middle
-        planes = new
-        trust = sure.ravel() / (1 + ((values - planes) / OUTLIER) ** 2)
+    planes = np.empty_like(values)
+    for p in range(values.size):
+        w = weights[p] * sure.ravel()
+        w /= w.sum()
+        away = places - places[p]
+        middle, value = w @ away, w @ values
+        spread = (w[:, None] * (away - middle)).T @ (away - middle) + STEADY * np.eye(2)
+        planes[p] = value - np.linalg.solve(spread, (w * (values - value)) @ (away - middle)) @ middle
     return planes.reshape(found.shape)
 
 

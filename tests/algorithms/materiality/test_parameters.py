@@ -47,7 +47,7 @@ def test_presets_set_nothing_that_is_not_read(name):
 
 SILENT = [
     ({}, "count=1.0 counted=global target=union across=1.0 along=1.0 edge=5.0 sharpness=5.0 sigma=5.0 tolerance=0.1"),
-    ({"passes": 0}, "material=0.1 tolerance=0.1"),
+    ({"passes": 0}, "material=0.1 tolerance=0.1 visibility=false"),
     (
         {"passes": 0, "start": "soft"},
         "adaptive=5.0 mending=1 hidden=0.1 small_step=0.1 large_step=2.0 contrast=5.0 confidence=both",
@@ -62,7 +62,7 @@ SILENT = [
     ),
     ({"optimiser": "fista", "passes": 5, "across": 0.0, "along": 0.0}, "edge=5.0"),
     ({"optimiser": "fista", "passes": 5, "count": 0.0}, "counted=global target=union"),
-    ({"optimiser": "fista", "passes": 2}, "tolerance=0.9 confidence=materiality"),
+    ({"optimiser": "fista", "passes": 2}, "tolerance=0.9 confidence=materiality visibility=false"),
 ]
 
 
