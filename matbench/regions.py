@@ -198,6 +198,30 @@ def view_regions(
     return {name: known & mask for name, mask in zip(VIEW_REGIONS, masks, strict=True)}
 
 
+def seen_by(
+    truth: NDArray[np.float32],
+    ref: int,
+    count: int,
+    seen: Mask | None = None,
+    positions: Sequence[float] | None = None,
+) -> Mapping[str, Mask]:
+    """The known pixels by how many views see their point, the reference view counted: ``seen_1``, ``seen_2`` and so on.
+
+    ``seen_1`` is ``seen_once``, and the last one is ``seen_in_all``. No run scores them on its own. Parameters are
+    those of `view_regions`.
+
+    >>> flat = np.full((1, 8), 2, np.float32)
+    >>> {name: int(mask.sum()) for name, mask in seen_by(flat, 1, 3).items()}
+    {'seen_1': 0, 'seen_2': 4, 'seen_3': 4}
+    """
+    known, views = np.isfinite(truth), np.ones(truth.shape, np.intp)
+    for view in range(count):
+        if view != ref:
+            steps = view - ref if positions is None else positions[view] - positions[ref]
+            views += points_seen(truth, steps) if seen is None else seen[view]
+    return {f"seen_{number}": known & (views == number) for number in range(1, count + 1)}
+
+
 def near_jumps(disparity: NDArray[np.float32], occluded: Mask) -> Mask:
     """Pixels within a window around a depth jump or an occlusion.
 

@@ -14,6 +14,7 @@ from matbench.regions import (
     near_jumps,
     points_seen,
     regions,
+    seen_by,
     textureless,
     view_regions,
 )
@@ -238,6 +239,21 @@ def test_regions_over_views_follow_a_choice_of_views_and_the_others_do_not() -> 
     np.testing.assert_array_equal(two["seen_in_all"], scene.regions["nonocc"])
     np.testing.assert_array_equal(two["seen_once"], scene.regions["occ"])
     assert not two["half_occluded"].any()
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_pixels_by_how_many_views_see_them(exact: bool) -> None:
+    scene = SYNTHETIC.load("steps", {"size": "120x90"}, None)
+    truth, seen = scene.truth[scene.ref], scene.visible[scene.ref] if exact else None
+    masks, over_views = (of(truth, scene.ref, scene.n, seen) for of in (seen_by, view_regions))
+    assert list(masks) == [f"seen_{number}" for number in range(1, scene.n + 1)]
+    np.testing.assert_array_equal(sum(mask.astype(int) for mask in masks.values()), np.isfinite(truth))
+    np.testing.assert_array_equal(masks["seen_1"], over_views["seen_once"])
+    np.testing.assert_array_equal(masks[f"seen_{scene.n}"], over_views["seen_in_all"])
+    if seen is not None:
+        others = [view for view in range(scene.n) if view != scene.ref]
+        for number, mask in enumerate(masks.values(), 1):
+            assert (1 + seen[others].sum(axis=0)[mask] == number).all()
 
 
 def test_real_scenes_have_regions_over_views(real: Real) -> None:
