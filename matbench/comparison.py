@@ -10,7 +10,7 @@ from attrs import evolve, frozen
 
 from matbench.errors import UserError
 from matbench.plans import plugins
-from matbench.plans.plan import make_plan, methods
+from matbench.plans.plan import Method, make_plan, methods
 from matbench.plans.record_option import RecordOption
 from matbench.plans.request import seeds_of
 from matbench.plans.settings import Settings
@@ -20,6 +20,7 @@ from matbench.runs.store import Store
 from matbench.scene import Scene
 from matbench.scenes.catalogue import data_root
 from matbench.scenes.chosen import choose
+from matbench.solving.compile_ahead import Ahead, methods_to_compile
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,22 +94,35 @@ def _prepare(
     root = data_root(settings.data)
     if not chosen:
         raise UserError("nothing to compare: name at least one algorithm and one scene")
-    found = choose(scenes, root, rows, growth.known)
-    if settings.published:
-        from matbench.reports import published
+    ahead = _compiling(chosen) if write and settings.dask is None else None
+    try:
+        found = choose(scenes, root, rows, growth.known)
+        if settings.published:
+            from matbench.reports import published
 
-        published.check(found.scenes)
-    plan = make_plan(chosen, found.scenes, seeds, files, found.spellings, repeats, growth.among)
-    folder = Path(out) if out is not None else RUNS / plan.digest
-    said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
-    settings = evolve(settings, data=root)
-    ready = Comparison(plan, Store(folder), found.scenes, settings, said, found.left_out, tuple(files))
-    ready.store.check(plan)
-    if settings.against is not None:
-        ready.shared_with(settings.against)
-    if write:
-        Store.open(folder, plan, said)
+            published.check(found.scenes)
+        plan = make_plan(chosen, found.scenes, seeds, files, found.spellings, repeats, growth.among)
+        folder = Path(out) if out is not None else RUNS / plan.digest
+        said = command if command is not None else shlex.join(["matbench", *sys.argv[1:]])
+        settings = evolve(settings, data=root)
+        ready = Comparison(plan, Store(folder), found.scenes, settings, said, found.left_out, tuple(files), ahead=ahead)
+        ready.store.check(plan)
+        if settings.against is not None:
+            ready.shared_with(settings.against)
+        if write:
+            Store.open(folder, plan, said)
+    except BaseException:
+        if ahead is not None:
+            ahead.stop()
+        raise
     return ready
+
+
+def _compiling(chosen: Sequence[Method]) -> Ahead | None:
+    """Begin to compile the kernels of the methods, where none are kept; scenes are read meanwhile."""
+    kept = plugins.kernel_cache()
+    selectors = methods_to_compile(chosen, kept)
+    return Ahead.begin(selectors, kept) if selectors else None
 
 
 def compare(

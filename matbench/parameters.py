@@ -5,7 +5,7 @@ A constructor's arguments are the parameters. An argument whose type is an attrs
 
 import inspect
 from collections.abc import Mapping
-from functools import cache, wraps
+from functools import wraps
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
@@ -47,8 +47,7 @@ def _literal(value: Any, kind: Any) -> Any:
     return {str(choice): choice for choice in get_args(kind)}[str(value)]
 
 
-@cache
-def _converter() -> Converter:
+def _made() -> Converter:
     converter = Converter()
     truths = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
     converter.register_structure_hook(bool, _strict(bool, truths))
@@ -58,6 +57,10 @@ def _converter() -> Converter:
     converter.register_structure_hook_func(_is_literal, _literal)
     converter.register_structure_hook_func(lambda kind: kind is Any, lambda value, _: value)
     return converter
+
+
+_CONVERTER = _made()
+"""Made once, before the processes of cells are forked: it takes as long as a small cell."""
 
 
 def describe(kind: Any) -> str:
@@ -247,7 +250,7 @@ def build(name: str, cls: type, options: Mapping[str, Any]) -> Any:
             raise unknown(f"parameter of {name}", key, [*fields, *(["preset"] if presets else [])])
         kind = fields[key].kind
         try:
-            values[key] = _converter().structure(value, kind)
+            values[key] = _CONVERTER.structure(value, kind)
         except Exception:  # whatever a converter raises for a value that is not of its type
             raise UserError(f"{name}: {key}={value} is not {describe(kind)}") from None
     missing = [key for key in required(cls) if key not in values]

@@ -1,6 +1,7 @@
 """A comparison that is ready: its plan, its scenes and its folder, to be run, scored and reported."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,6 +29,7 @@ from matbench.scene import Scene
 from matbench.scenes.scene_check import beyond_range
 from matbench.shelf import Shelf, facts_of
 from matbench.solving import run
+from matbench.solving.compile_ahead import Ahead
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,6 +57,8 @@ class Comparison:
         Metrics that the run's tables had before: they are computed again.
     decision
         How a run ended that grew until a difference was decided, for the report.
+    ahead
+        The methods that are being compiled for it, if there are any.
     """
 
     plan: Plan
@@ -66,6 +70,7 @@ class Comparison:
     files: tuple[Path, ...] = ()
     measured: tuple[str, ...] = ()
     decision: str = ""
+    ahead: Ahead | None = None
 
     @property
     def folder(self) -> Path:
@@ -120,7 +125,7 @@ class Comparison:
         found = plugins.algorithms([Path(file) for file in self.plan.plugin_files])
         entries = [found[name].entry for name in sorted(names)]
         preload = [entry.module for entry in entries if not isinstance(entry, type)]
-        with locked(self.folder) as work, provenance.commit_known():
+        with self._compiled(), locked(self.folder) as work, provenance.commit_known():
 
             def listening(event: run.Event, cell: Cell, outcome: Outcome | None) -> None:
                 if event == "start":
@@ -132,9 +137,18 @@ class Comparison:
             try:
                 self.store.write_plan(self.plan)
                 left = (todo or self.pending()).cells
-                run.run(self.plan, self.store, self.settings, left, preload, listening, self.scenes)
+                run.run(self.plan, self.store, self.settings, left, preload, listening, self.scenes, self.ahead)
             except OSError as error:
                 raise Stopped.of(self.folder, error) from error
+
+    @contextmanager
+    def _compiled(self) -> Iterator[None]:
+        """After this block nothing is compiled any more."""
+        try:
+            yield
+        finally:
+            if self.ahead is not None:
+                self.ahead.stop()
 
     def tables(self) -> Tables:
         """Score the stored maps; write ``results.csv`` and ``cells.csv``, and the tables of curves that have rows."""

@@ -195,17 +195,20 @@ class Numbers:
         """Metric -> region -> `shown` x methods of entries; the status stands where a cell did not end well."""
         bad = self.report.cells[self.report.cells["status"] != "ok"]
         status = {(m, s): state for m, s, state in zip(bad["method"], bad["scene"], bad["status"], strict=True)}
-        has = {s: pd.Series({m: s in self.scope.has[m] for m in self.scope.methods}, dtype=bool) for s in self.shown}
+        methods, nothing = self.scope.methods, float("nan")
+        has = {s: {m: s in self.scope.has[m] for m in methods} for s in self.shown}
 
         def make(metric: str, table: pd.DataFrame, answered: pd.DataFrame) -> list[list[Entry]]:
-            out = []
-            rows = (part.loc[list(self.shown)].iterrows() for part in (table, answered))
-            for (scene, row), (_, over) in zip(*rows, strict=True):
-                here = has[str(scene)]
-                unit, better = self.units[metric], self.better(metric)
-                found = entries(row.where(here), here, unit, better, over.where(here))
-                found |= {m: [None, str(status[m, scene]), 0] for m in self.scope.methods if (m, scene) in status}
-                out.append([found[m] for m in self.scope.methods])
+            out, unit, better = [], self.units[metric], self.better(metric)
+            rows = (part.loc[list(self.shown)].to_numpy(float).tolist() for part in (table, answered))
+            for scene, *both in zip(self.shown, *rows, strict=True):
+                here = has[scene]
+                values, over = (
+                    {m: v if here[m] else nothing for m, v in zip(methods, row, strict=True)} for row in both
+                )
+                found = _entries(values, here, unit, better, over)
+                found |= {m: [None, str(status[m, scene]), 0] for m in methods if (m, scene) in status}
+                out.append([found[m] for m in methods])
             return out
 
         return self._by_metric(make)
@@ -315,18 +318,23 @@ def entries(
         Method -> per cent of the pixels that its value is over: it is told, and who has too little gets no place.
     """
     # with plain numbers: a page asks for thousands of entries, and pandas takes a millisecond for each
-    names, numbers = [str(method) for method in values.index], values.to_numpy(float).tolist()
-    over = dict.fromkeys(names, float("nan"))
-    if answered is not None:
-        given = dict(zip(map(str, answered.index), answered.to_numpy(float).tolist(), strict=True))
-        over = {name: given.get(name, float("nan")) for name in names}
+    return _entries(_plain(values), _plain(ranked), unit, better, {} if answered is None else _plain(answered))
+
+
+def _plain(series: pd.Series) -> dict[str, Any]:
+    return dict(zip(map(str, series.index), series.tolist(), strict=True))
+
+
+def _entries(
+    values: Mapping[str, float], ranked: Mapping[str, bool], unit: str, better: Better, answered: Mapping[str, float]
+) -> dict[str, Entry]:
+    over = {name: answered.get(name, float("nan")) for name in values}
     aside = tables.silent_ones(over)
-    is_ranked = dict(zip(map(str, ranked.index), ranked.tolist(), strict=True))
-    placed = [name for name in names if is_ranked[name] and name not in aside]
-    shown = dict(zip(names, (text(value, unit) for value in numbers), strict=True))
+    shown = {name: text(value, unit) for name, value in values.items()}
+    placed = [name for name in values if ranked[name] and name not in aside]
     marks = tables.places_of({name: shown[name] for name in placed}, better)
     out: dict[str, Entry] = {}
-    for name, value in zip(names, numbers, strict=True):
+    for name, value in values.items():
         out[name] = [_sortable(value), shown[name], marks.get(name, 0)]
         if (answers := over[name]) < 100 and value == value:
             said = f"{tables.share(answers)} answered"

@@ -25,6 +25,7 @@ VIEWS = tuple(VIEW_REGIONS)
 Numbers = TypeVar("Numbers", float, pd.Series, pd.DataFrame)
 
 NO_NUMBER = "–"
+COUNTED = "counted"
 EFFECT = "d"
 """The unit of effect sizes, Cohen's d: how many standard deviations."""
 
@@ -47,18 +48,25 @@ def label(algorithm: str, params: str) -> str:
 
 
 def labelled(frame: pd.DataFrame) -> pd.DataFrame:
-    """`results` or `cells` with a further column, `method`; also if they were read from a file."""
+    """`results` or `cells` with a further column, `method`; also if they were read from a file.
+
+    Results have one more, which rows enter means (`matbench.results.comparable.counted`): it takes long to find.
+    """
     if "method" in frame:
         return frame
     out = frame.copy()
     out["params"] = out["params"].astype(object).where(out["params"].notna(), "").astype(str)
-    out["method"] = [label(a, p) for a, p in zip(out["algorithm"], out["params"], strict=True)]
+    names = list(zip(*(out[name].to_numpy(object) for name in ("algorithm", "params")), strict=True))
+    labels = {both: label(*both) for both in set(names)}
+    out["method"] = np.array([labels[both] for both in names], object)
     if "seed" not in out:
         out["seed"] = 0
     if "value" in out and "answered" not in out:
         out["answered"] = np.nan  # nobody knows
-    names = out.columns.intersection(["method", "scene", "region", "metric", "unit", "status"])
-    return out.astype(dict.fromkeys(names, object))
+    if {"scene", "region", "metric", "value", "pixels"} <= set(out.columns):
+        out[COUNTED] = counted(out)
+    texts = out.columns.intersection(["method", "scene", "region", "metric", "unit", "status"])
+    return out.astype(dict.fromkeys(texts, object))
 
 
 @frozen
@@ -150,8 +158,8 @@ def per_scene(results: pd.DataFrame, region: str, metric: str, column: str = "va
         ``"answered"`` for the per cent of the pixels that the scores are over.
     """
     scored = labelled(results)
-    rows = scored[(scored["metric"] == metric)]
-    rows = rows[counted(rows) & (rows["region"] == region)]
+    rows = scored[(scored["metric"] == metric) & (scored["region"] == region)]
+    rows = rows[rows[COUNTED].to_numpy(bool)]
     return _wide(rows, ["scene", "method"], column).reindex(
         index=pd.Index(scored["scene"].unique(), name="scene"),
         columns=pd.Index(scored["method"].unique(), name="method"),
@@ -161,7 +169,7 @@ def per_scene(results: pd.DataFrame, region: str, metric: str, column: str = "va
 def every_scene(results: pd.DataFrame, column: str = "value") -> dict[tuple[str, str], pd.DataFrame]:
     """(metric, region) -> the table that `per_scene` makes, for all of them at once."""
     scored = labelled(results)
-    wide = _wide(scored[counted(scored)], ["metric", "region", "scene", "method"], column)
+    wide = _wide(scored[scored[COUNTED].to_numpy(bool)], ["metric", "region", "scene", "method"], column)
     scenes, methods = scored["scene"].unique(), scored["method"].unique()
     return {
         (str(metric), str(region)): part.droplevel(["metric", "region"]).reindex(index=scenes, columns=methods)

@@ -63,6 +63,7 @@ def tables(
     others
         Further metrics, which are shown in `REGION` -> which direction of them is better.
     """
+    results, cells = labelled(results), labelled(cells)
     scope = shared(results, cells)
     out = []
     if scope.methods and len(results):
@@ -87,8 +88,7 @@ def tables(
             out += _by_metric(results, cells, scope, measured, {metric: better, **others}, width)
     if len(results):
         out += _scenes(results, cells, scope, metric, better, width)
-    bad = labelled(cells)
-    bad = bad[bad["status"] != "ok"]
+    bad = cells[cells["status"] != "ok"]
     if len(bad):
         out.append(_bad(bad))
     return out
@@ -246,8 +246,7 @@ def _scenes(
     first = max(_NAMES, min(max(map(len, names.values()), default=0), 28)) + _PADDING
     heads = _headings(methods, numbers, room - first)
     at_once = len(methods) if not heads[0].startswith("#") else max(1, (room - first) // (7 + _PADDING))
-    bad = labelled(cells)
-    bad = bad[bad["status"] != "ok"]
+    bad = cells[cells["status"] != "ok"]
     status = {(m, s): state for m, s, state in zip(bad["method"], bad["scene"], bad["status"], strict=True)}
     out = []
     for start in range(0, len(methods), at_once):

@@ -85,6 +85,8 @@ def _mapped(table: pd.DataFrame, change) -> pd.DataFrame:  # type: ignore[no-unt
     out = table.rename(columns=lambda name: change(name) if isinstance(name, str) else name)
     for place, kind in enumerate(table.dtypes):
         if pd.api.types.is_object_dtype(kind) or pd.api.types.is_string_dtype(kind):
-            values = [change(one) if isinstance(one, str) else one for one in table.iloc[:, place]]
-            out.isetitem(place, np.array(values, object))
+            values = table.iloc[:, place].to_numpy(object)
+            # a column repeats few texts: each is looked at once
+            changed = {one: change(one) for one in set(values) if isinstance(one, str)}
+            out.isetitem(place, np.array([changed.get(one, one) for one in values], object))
     return out

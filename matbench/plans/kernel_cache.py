@@ -46,6 +46,11 @@ class KernelCache(FunctionCache):
             self._cache_file.remove()
             return None
 
+    def signatures(self, target: Any) -> list[Any]:
+        """The types for which machine code of this kernel is kept, for this processor and this code."""
+        codegen = target.codegen()
+        return [key[0] for key in self._cache_file._load_index() if key == self._index_key(key[0], codegen)]
+
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Keep a compiled kernel, if the file system takes it."""
         try:

@@ -268,12 +268,13 @@ def code_of(plugin: Plugin) -> Code:
 
 
 def read_ahead(name: str, files: Iterable[str]) -> None:
-    """Read the code of a method without running it. Processes that are forked from this one need not read it again."""
+    """Read the code of a method without running it, as it is now: processes that are forked from this one know it."""
     with suppress(OSError):  # a file that cannot be read is reported where it is needed
         for file in files:
             code.of_file(Path(file))
     if (plugin := installed("algorithms").get(name)) is not None:
-        code_of(plugin)
+        code_digest.cache_clear()
+        code_digest(plugin)
 
 
 @cache

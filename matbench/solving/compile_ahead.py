@@ -1,4 +1,4 @@
-"""Kernels of built-in methods, compiled before the first cell where none are kept yet, several methods at once.
+"""Kernels of built-in methods, compiled while the plan is made where none are kept yet, several methods at once.
 
 Cells are solved one after the other, so that their seconds compare, and would be compiled so, too. Only methods of the
 harness itself that run by default are compiled here: all others run nowhere but in a process that a keeper watches.
@@ -10,43 +10,72 @@ import os
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
+from attrs import define, field
 
+from matbench import linux
 from matbench.plans import kernels, plugins
 from matbench.plans.limits import cores
-from matbench.plans.plan import Cell
+from matbench.plans.plan import Method
 
 _SIZE = 16, 64  # rows and columns of the noise
 
 
-def methods_to_compile(cells: Iterable[Cell]) -> list[str]:
-    """Selectors of the methods of these cells that run by default, if no kernels at all are kept yet; else none."""
-    kept = os.environ.get(kernels.VARIABLE)
-    if not kept or next(Path(kept).rglob("*.nbi"), None) is not None:
+def methods_to_compile(methods: Iterable[Method], kept: Path) -> list[str]:
+    """Selectors of those methods that run by default, if no kernels at all are kept in that folder yet; else none.
+
+    In the order in which to compile them: first what brings most code, then what adds most to it. So two that share
+    their kernels are not compiled at once, each for itself.
+    """
+    if next(kept.rglob("*.nbi"), None) is not None:
         return []
-    found = {cell.method.algorithm: cell.method for cell in cells if not cell.method.file}
     # the others may need files of the user's, or run programs, which only a keeper's process may
-    own = [method for name, method in found.items() if name in plugins.default_algorithms()]
-    return [f"{m.algorithm}[{m.changed}]" if m.changed else m.algorithm for m in own]
+    own = set(plugins.default_algorithms())
+    left = {method.algorithm: method for method in methods if not method.file and method.algorithm in own}
+    code = {name: _sizes(name) for name in left}
+    claimed: set[Path] = set()
+    found = []
+    while left:
+        name = max(left, key=lambda one: sum(size for file, size in code[one].items() if file not in claimed))
+        claimed.update(code[name])
+        method = left.pop(name)
+        found.append(f"{name}[{method.changed}]" if method.changed else name)
+    return found
 
 
-def compile_ahead(selectors: Iterable[str]) -> None:
-    """Have methods compile their kernels, as many at once as there are cores; nothing for a single one."""
-    waiting = deque(selectors)
-    if len(waiting) < 2 or cores() < 2:
-        return
-    # the modules that are found here, and none of the working folder, which `-m` would look into first
-    line = [sys.executable, "-P", "-m", "matbench.solving.compile_ahead"]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    many = min(cores(), len(waiting))
-    running: list[subprocess.Popen[str]] = []
-    with suppress(OSError), ThreadPoolExecutor(many) as pool:
-        try:
+def _sizes(algorithm: str) -> dict[Path, int]:
+    """File -> bytes, of all code of a method."""
+    files = plugins.code_of(plugins.installed("algorithms")[algorithm]).files.values()
+    return {file: file.stat().st_size for file in files}
+
+
+@define(eq=False)
+class Ahead:
+    """Methods that are being compiled, by processes beside this one: as many as there are cores.
+
+    It is waited for or stopped (`wait`, `stop`). Its processes end with this one.
+    """
+
+    _waiting: deque[str]
+    _running: list["subprocess.Popen[str]"] = field(factory=list)
+    _threads: list[Thread] = field(factory=list)
+
+    @classmethod
+    def begin(cls, selectors: Sequence[str], kept: Path) -> "Ahead":
+        """Start to compile methods into a folder; nothing is started for a single one, or a single core."""
+        ahead = cls(deque(selectors))
+        many = min(cores(), len(selectors))
+        if many < 2:
+            return ahead
+        # the modules that are found here, and none of the working folder, which `-m` would look into first
+        line = [sys.executable, "-P", "-m", "matbench.solving.compile_ahead"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), kernels.VARIABLE: str(kept)}
+        with suppress(OSError):
             for _ in range(many):
                 one = subprocess.Popen(  # noqa: S603 -- this interpreter
                     line,
@@ -56,24 +85,44 @@ def compile_ahead(selectors: Iterable[str]) -> None:
                     stderr=subprocess.DEVNULL,
                     text=True,
                 )
-                running.append(one)
-            list(pool.map(lambda one: _feed(one, waiting), running))
-        finally:  # in here: whoever leaves the pool waits for its threads, and these for their processes
-            waiting.clear()
-            for one in running:
-                one.kill()
-                one.wait()
+                ahead._running.append(one)
+        for one in ahead._running:
+            ahead._threads.append(Thread(target=ahead._feed, args=(one,), daemon=True))
+            ahead._threads[-1].start()
+        return ahead
 
+    def wait(self) -> None:
+        """Go on when all is compiled; whoever is interrupted meanwhile has stopped it."""
+        try:
+            for thread in self._threads:
+                thread.join()
+        finally:
+            self.stop()
 
-def _feed(process: "subprocess.Popen[str]", waiting: "deque[str]") -> None:
-    """Hand a process one method after the other, until none is left or it ends."""
-    assert process.stdin is not None and process.stdout is not None, "pipes"  # noqa: S101, PT018
-    with suppress(IndexError, OSError):
-        while True:
-            process.stdin.write(waiting.popleft() + "\n")
-            process.stdin.flush()
-            if not process.stdout.readline():
-                return
+    def stop(self) -> None:
+        """End its processes, whatever they do."""
+        self._waiting.clear()
+        for one in self._running:
+            one.kill()
+            one.wait()
+        for thread in self._threads:
+            thread.join()
+        for one in self._running:
+            for pipe in filter(None, (one.stdin, one.stdout)):
+                with suppress(OSError):
+                    pipe.close()
+        self._running.clear()
+        self._threads.clear()
+
+    def _feed(self, process: "subprocess.Popen[str]") -> None:
+        """Hand a process one method after the other, until none is left or it ends."""
+        assert process.stdin is not None and process.stdout is not None, "pipes"  # noqa: S101, PT018
+        with suppress(IndexError, OSError, ValueError):
+            while True:
+                process.stdin.write(self._waiting.popleft() + "\n")
+                process.stdin.flush()
+                if not process.stdout.readline():
+                    return
 
 
 def main() -> None:
@@ -83,6 +132,7 @@ def main() -> None:
     from matbench.plans.plugins import algorithm
     from matbench.scene import Range, Scene
 
+    linux.die_with_parent(os.getppid())
     views = np.random.default_rng(0).integers(0, 256, (5, *_SIZE, 3), np.uint8)
     scene = Scene("noise/noise", views, tuple("abcde"), 2, Range(0, 8), {}, 2)
     for line in sys.stdin:

@@ -18,7 +18,7 @@ from matbench.runs.outcome import Outcome
 from matbench.runs.store import Store
 from matbench.scene import Scene
 from matbench.solving import strays
-from matbench.solving.compile_ahead import compile_ahead, methods_to_compile
+from matbench.solving.compile_ahead import Ahead
 from matbench.solving.environment import kernel_cache_in_use, without_main
 from matbench.solving.keeper import LOOK, Keeper, dismiss
 from matbench.solving.ready_views import ReadyViews
@@ -36,6 +36,7 @@ def run(
     preload: Iterable[str] = (),
     listen: Listener | None = None,
     scenes: Mapping[str, Scene] = MappingProxyType({}),
+    ahead: Ahead | None = None,
 ) -> None:
     """Compute cells of a plan.
 
@@ -54,6 +55,8 @@ def run(
         Called as each cell starts and ends.
     scenes
         Those that are in memory already, by name: their views are handed to the keepers, which read others themselves.
+    ahead
+        The methods that are being compiled: it is waited for before the first cell.
 
     Raises
     ------
@@ -85,7 +88,8 @@ def run(
 
                 cluster.run_cells(plan, store, settings, todo, tell)
                 return
-            compile_ahead(methods_to_compile(todo))
+            if ahead is not None:
+                ahead.wait()
             _run_here(plan, store, settings, preload, todo, tell, scenes)
             if settings.steady:
                 doubtful = [cell for cell in todo if (found := store.outcome(cell)) is not None and found.is_doubtful]
