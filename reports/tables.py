@@ -20,6 +20,7 @@ METRIC, REGION = "total_bad_1", "all"
 THRESHOLD = re.compile(r"(bad|total_bad)_(\d+(?:\.\d+)?)")
 """Metrics that have a threshold in their name, in px of the pair."""
 
+_NUMBERED = re.compile(r"-[0-9]+$")
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
 VIEWS = tuple(VIEW_REGIONS)
 Numbers = TypeVar("Numbers", float, pd.Series, pd.DataFrame)
@@ -65,8 +66,9 @@ def labelled(frame: pd.DataFrame) -> pd.DataFrame:
         out["answered"] = np.nan  # nobody knows
     if {"scene", "region", "metric", "value", "pixels"} <= set(out.columns):
         out[COUNTED] = counted(out)
-    texts = out.columns.intersection(["method", "scene", "region", "metric", "unit", "status"])
-    return out.astype(dict.fromkeys(texts, object))
+    texts = out.columns.intersection(["method", "scene", "unit", "status"])
+    chosen_by = out.columns.intersection(["region", "metric"])  # again and again, in a table of a million rows
+    return out.astype(dict.fromkeys(texts, object) | dict.fromkeys(chosen_by, "category"))
 
 
 @frozen
@@ -97,13 +99,26 @@ class Shared:
 
     @property
     def mixture(self) -> str:
-        """How many of the shared scenes are of which dataset, as every scene weighs the same; empty if all are of one.
+        """How many of the shared scenes are of which kind, as every scene weighs the same; empty if all are of one.
+
+        A kind is a dataset. Of one with scenes that are told apart by a number at the end, such as random worlds, it is
+        what stands before the number.
 
         >>> Shared(("m",), (), {}, ("a/x", "b/y", "b/z")).mixture
         'a 1, b 2'
+        >>> Shared(("m",), (), {}, ("a/x", "b/world-1", "b/world-thin-2[n=5]", "b/world-thin-3", "b/box")).mixture
+        'a 1, b/world 1, b/world-thin 2, b/box 1'
         """
-        counts = Counter(scene.partition("/")[0] for scene in self.scenes)
-        return ", ".join(f"{dataset} {count}" for dataset, count in counts.items()) if len(counts) > 1 else ""
+        names = [witness(scene) for scene in self.scenes]
+        families = [_NUMBERED.sub("", name) for name in names]
+        numbered = {name.partition("/")[0] for name, family in zip(names, families, strict=True) if family != name}
+        datasets = [name.partition("/")[0] for name in names]
+        kinds = [family if of in numbered else of for family, of in zip(families, datasets, strict=True)]
+        for dataset in numbered:  # all of one family: the dataset's name says as much
+            if len({kind for kind, of in zip(kinds, datasets, strict=True) if of == dataset}) == 1:
+                kinds = [of if of == dataset else kind for kind, of in zip(kinds, datasets, strict=True)]
+        counts = Counter(kinds)
+        return ", ".join(f"{kind} {count}" for kind, count in counts.items()) if len(counts) > 1 else ""
 
     def is_ranked(self, method: str) -> bool:
         """Has the method every shared scene? Only then is it compared with the others."""
@@ -169,7 +184,11 @@ def per_scene(results: pd.DataFrame, region: str, metric: str, column: str = "va
 def every_scene(results: pd.DataFrame, column: str = "value") -> dict[tuple[str, str], pd.DataFrame]:
     """(metric, region) -> the table that `per_scene` makes, for all of them at once."""
     scored = labelled(results)
-    wide = _wide(scored[scored[COUNTED].to_numpy(bool)], ["metric", "region", "scene", "method"], column)
+    wide = _wide(
+        scored[scored[COUNTED].to_numpy(bool)].astype({"metric": object, "region": object}),
+        ["metric", "region", "scene", "method"],
+        column,
+    )
     scenes, methods = scored["scene"].unique(), scored["method"].unique()
     return {
         (str(metric), str(region)): part.droplevel(["metric", "region"]).reindex(index=scenes, columns=methods)

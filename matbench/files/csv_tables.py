@@ -15,6 +15,7 @@ from matbench.files.plain import read_plain
 from matbench.safe_text import csv_field, from_csv_field
 
 _HEAD, _MOST_COLUMNS = 1 << 12, 64  # bytes of the first line; no table has half as many columns
+_AT_ONCE = 1 << 16  # rows
 _TOO_MANY = "its lines have more fields than its first one has columns"
 EACH_CELL, LARGEST = 1 << 18, 1 << 28
 """Bytes of a table: so many for each cell of its run, but no more than so many in all."""
@@ -22,7 +23,12 @@ EACH_CELL, LARGEST = 1 << 18, 1 << 28
 
 def csv_text(table: pd.DataFrame) -> str:
     """A table as the text of a CSV file, without its index (`matbench.safe_text.csv_field`)."""
-    return _mapped(table, csv_field).to_csv(index=False, lineterminator="\n")
+    starts = range(0, max(1, len(table)), _AT_ONCE)
+    parts = (_mapped(table.iloc[start : start + _AT_ONCE], csv_field) for start in starts)
+    # pandas holds a text that it writes in four bytes a character: never all of a long table
+    return "".join(
+        part.to_csv(index=False, header=not number, lineterminator="\n") for number, part in enumerate(parts)
+    )
 
 
 def most_bytes(cells: int) -> int:

@@ -20,8 +20,10 @@ def counted(results: pd.DataFrame) -> NDArray[np.bool_]:
     whole = results["pixels"].where(results["region"] == "all")
     known = whole.groupby([results["scene"], results["metric"]]).transform("max").fillna(results["pixels"])
     # few different sizes occur, so each is asked about once
-    place, sizes = pd.MultiIndex.from_arrays([results["pixels"], known]).factorize()
-    holds = np.array([counts(int(pixels), int(of)) for pixels, of in sizes], bool)[place]
+    (first, pixels), (second, of) = pd.factorize(results["pixels"]), pd.factorize(known)
+    place, sizes = pd.factorize(first * np.int64(len(of)) + second)
+    answers = [counts(int(pixels[size // len(of)]), int(of[size % len(of)])) for size in sizes]
+    holds = np.array(answers, bool)[place] & (first >= 0)  # a damaged table may not say how many pixels
     keys = [results[name] for name in ("scene", "region", "metric")]
     has = results["value"].notna().groupby(keys).transform("any").to_numpy(bool)
     both: NDArray[np.bool_] = holds & has

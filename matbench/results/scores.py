@@ -1,13 +1,13 @@
 """Tables of a run, computed from its stored maps: no method runs again for a new metric."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from statistics import median
 
 import numpy as np
 import pandas as pd
-from attrs import field, frozen
+from attrs import define, field, frozen
 from numpy.typing import NDArray
 
 from matbench.errors import UserError
@@ -76,6 +76,7 @@ _NUMBERS = (
     *DEVICE,
 )
 _LARGEST = 1e100
+_AT_ONCE = 1 << 16  # rows
 RELIABILITY_COLUMNS = ("algorithm", "params", "scene", "seed", "materiality", "observed", "points")
 SPARSIFICATION_COLUMNS = ("algorithm", "params", "scene", "seed", "coverage", "risk", "best", "pixels")
 
@@ -115,6 +116,29 @@ class Tables:
     outcomes: Mapping[str, Outcome] = field(factory=dict)
 
 
+@define
+class _Rows:
+    """A table while its rows are found: as tuples few of them are held at a time, as these take five times the room."""
+
+    columns: Sequence[str]
+    _parts: list[pd.DataFrame] = field(factory=list)
+    _rows: list[tuple[object, ...]] = field(factory=list)
+
+    def add(self, rows: Iterable[tuple[object, ...]]) -> None:
+        self._rows += rows
+        if len(self._rows) >= _AT_ONCE:
+            self._settle()
+
+    def table(self) -> pd.DataFrame:
+        if self._rows or not self._parts:
+            self._settle()
+        return pd.concat(self._parts, ignore_index=True) if len(self._parts) > 1 else self._parts[0]
+
+    def _settle(self) -> None:
+        self._parts.append(pd.DataFrame(self._rows, columns=list(self.columns)))
+        self._rows = []
+
+
 def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene], names: Sequence[str] = ()) -> Tables:
     """Score a run. Every cell is read only once, so that its rows in all tables belong to the same solve.
 
@@ -128,7 +152,7 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene], names: Sequenc
     UserError
         If a scene is not the one that was solved.
     """
-    rows: list[tuple[object, ...]] = []
+    rows = _Rows(RESULT_COLUMNS)
     lines: list[tuple[object, ...]] = []
     curves: list[pd.DataFrame] = []
     risks: list[tuple[object, ...]] = []
@@ -154,14 +178,14 @@ def tables(plan: Plan, store: Store, scenes: Mapping[str, Scene], names: Sequenc
             _check_scene(solved, scene)
             truth = scene.truth.get(scene.ref)
             error = None if truth is None else signed_error_map(solved.maps[scene.ref], truth, scene.pair_steps)
-            rows += _scored(solved, scene, used, error)
+            rows.add(_scored(solved, scene, used, error))
             curves += _curve(solved, scene)
             risks += _risks(solved, scene, error)
     cells = pd.DataFrame(lines, columns=list(CELL_COLUMNS))
     # pandas would take a column without any number for one of objects; `read` takes it for one of numbers
     nowhere = [name for name in _NUMBERS if cells[name].isna().all()]
     return Tables(
-        pd.DataFrame(rows, columns=list(RESULT_COLUMNS)),
+        rows.table(),
         cells.astype(dict.fromkeys(nowhere, float)),
         pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(columns=list(RELIABILITY_COLUMNS)),
         pd.DataFrame(risks, columns=list(SPARSIFICATION_COLUMNS)),

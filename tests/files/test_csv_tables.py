@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from matbench.files import csv_tables
 from matbench.files.csv_tables import EACH_CELL, LARGEST, csv_text, most_bytes, read_csv
 
 COLUMNS = ["algorithm", "metric", "value"]
@@ -75,3 +76,11 @@ def test_a_first_row_of_very_many_fields_is_refused_before_it_is_parsed(tmp_path
     with pytest.raises(ValueError, match="more fields than"):
         read_csv(path, COLUMNS, 1 << 20)
     assert time.process_time() - began < 1, "pandas takes four seconds"
+
+
+def test_a_long_table_is_written_in_parts_that_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = csv_text(TABLE)
+    for rows in (1, 3, 4):
+        monkeypatch.setattr(csv_tables, "_AT_ONCE", rows)
+        assert csv_text(TABLE) == whole
+        assert csv_text(TABLE.iloc[:0]) == "'=a,value,n\n"

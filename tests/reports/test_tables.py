@@ -143,3 +143,34 @@ def test_means_over_scenes_are_those_that_pandas_makes(seed: int) -> None:
     filled = table.notna().any(axis=1)
     twin = {m: table.loc[[s for s in scope.counted(m) if filled[s]], m].mean(skipna=False) for m in methods}
     pd.testing.assert_series_equal(tables.over_scenes(table[::-1], scope), pd.Series(twin), check_exact=True)
+
+
+def test_a_mixture_weighs_every_scene_the_same_and_says_so(report: Report) -> None:
+    values = {
+        "synthetic/world-7": 8.0,
+        "synthetic/world-thin-1": 2.0,
+        "synthetic/world-thin-2[n=5]": 4.0,
+        "mine/x": 0.0,
+    }
+    results = pd.DataFrame(
+        [
+            (a, "", s, "v", 0, "all", "total_bad_1", k + v, "%", 9)
+            for k, a in enumerate("ab")
+            for s, v in values.items()
+        ],
+        columns=report.results.columns,
+    )
+    cells = pd.DataFrame(
+        [(a, "", s, 0, "ok", 1.0) for a in "ab" for s in values],
+        columns=["algorithm", "params", "scene", "seed", "status", "seconds"],
+    )
+    assert tables.summary(results, cells)["total_bad_1 all"].to_dict() == {"a": 3.5, "b": 4.5}
+    told = "synthetic/world 1, synthetic/world-thin 2, mine 1"
+    assert tables.shared(results, cells).mixture == told
+    console = Console(file=io.StringIO(), width=200)
+    for table in terminal.tables(results, cells):
+        console.print(table)
+    said = " ".join(console.file.getvalue().split())  # type: ignore[attr-defined]
+    assert f"mean over 4 of 4 scenes ({told})" in said
+    thin = results[results["scene"].str.contains("thin")]
+    assert tables.shared(thin, cells[cells["scene"].str.contains("thin")]).mixture == "", "all are of one family"

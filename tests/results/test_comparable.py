@@ -21,6 +21,13 @@ def test_a_region_counts_by_its_pixels_for_all_methods_alike() -> None:
     assert counted(results)[[1, 5]].tolist() == [False, False]
 
 
+def test_a_damaged_row_does_not_count() -> None:
+    rows = [("s", "all", "bad_1", 1.0, 100), ("s", "all", "bad_1", 1.0, np.nan), ("t", "all", "bad_1", 1.0, 100)]
+    results = pd.DataFrame(rows, columns=["scene", "region", "metric", "value", "pixels"])
+    assert counted(results).tolist() == [True, False, True]
+    assert counted(results.iloc[:0]).tolist() == []
+
+
 def test_a_prediction_is_measured_against_its_own_view() -> None:
     rows = [("t", "all", "bad_1", 1.0, 100000), ("t", "all", "prediction_psnr", 30.0, 150)]
     results = pd.DataFrame(rows, columns=["scene", "region", "metric", "value", "pixels"])

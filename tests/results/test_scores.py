@@ -46,6 +46,13 @@ def test_results_are_tidy_and_exact(tmp_path: Path) -> None:
     assert set(results.params) == {"value=2.0"}
 
 
+def test_many_rows_make_the_same_table_in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = scored(tmp_path, "flat[value=2]", "empty")
+    (tmp_path / "run" / "results.csv").unlink()
+    monkeypatch.setattr(scores, "_AT_ONCE", 50)
+    pd.testing.assert_frame_equal(scored(tmp_path, "flat[value=2]", "empty"), whole)
+
+
 def test_an_empty_map_is_totally_bad(tmp_path: Path) -> None:
     results = scored(tmp_path, "empty")
     every = results[results.region == "all"].set_index("metric").value
