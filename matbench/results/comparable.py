@@ -20,7 +20,8 @@ def counted(results: pd.DataFrame) -> NDArray[np.bool_]:
     whole = results["pixels"].where(results["region"] == "all")
     known = whole.groupby([results["scene"], results["metric"]]).transform("max").fillna(results["pixels"])
     # few different sizes occur, so each is asked about once
-    (first, pixels), (second, of) = pd.factorize(results["pixels"]), pd.factorize(known)
+    first, pixels = map(np.asarray, pd.factorize(results["pixels"]))
+    second, of = map(np.asarray, pd.factorize(known))
     place, sizes = pd.factorize(first * np.int64(len(of)) + second)
     answers = [counts(int(pixels[size // len(of)]), int(of[size % len(of)])) for size in sizes]
     holds = np.array(answers, bool)[place] & (first >= 0)  # a damaged table may not say how many pixels
