@@ -173,6 +173,8 @@ def _varying(cells: pd.DataFrame) -> set[str]:
 
 def _sweeps_of(option: str, of: str, cells: pd.DataFrame, results: pd.DataFrame) -> list[Sweep]:
     """The sweeps of one option: `cells` have its `value` and the `curve` that they are on."""
+    if cells["value"].nunique() < LEAST_VALUES:  # most options take one value only
+        return []
     varying = _varying(cells) - set(REPEATS)
     rest = [{k: v for k, v in options.items() if of or k != option} for options in cells["options"]]
     setting = [spec.text({k: v for k, v in one.items() if k in varying}) for one in rest]
