@@ -1,15 +1,25 @@
-"""Scenes of a run by name: as many in memory as there is room for; others are loaded again when they are needed."""
+"""Scenes of a run by name: as many in memory as there is room for; others are put aside on disk until they are needed.
 
+They lie in a file without a name, as hidden as this process's memory, which goes with it. What the disk has no
+room for is loaded, or rendered, again.
+"""
+
+import os
+import pickle
+import zlib
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
+from tempfile import TemporaryFile
+from typing import IO, Any
 
-from attrs import frozen
+from attrs import evolve, fields, frozen
 
 from matbench.errors import UserError
 from matbench.scene import Scene
 
-ROOM = 1 << 30
-"""Bytes: about 300 worlds of 240x180 px, or one light field of 81 views."""
+ROOM = 1 << 29
+"""Bytes: about 150 worlds of 240x180 px, or half a light field of 81 views."""
 
 
 @frozen
@@ -43,8 +53,36 @@ def bytes_of(scene: Scene) -> int:
     return scene.views.nbytes + known + (0 if scene.held_out is None else scene.held_out.image.nbytes)
 
 
+@frozen(eq=False)
+class _Aside:
+    """Where a scene lies that was put aside: a file, and the bytes in it."""
+
+    file: IO[bytes]
+    begin: int
+    size: int
+
+    @classmethod
+    def put(cls, scene: Scene, file: IO[bytes]) -> "_Aside":
+        """Write a scene at the end of a file."""
+        held: dict[str, Any] = {one.name: getattr(scene, one.name) for one in fields(Scene)}
+        plain = {name: dict(value) if isinstance(value, Mapping) else value for name, value in held.items()}
+        content = zlib.compress(pickle.dumps(plain, protocol=5), 1)
+        begin = file.seek(0, 2)
+        file.write(content)
+        file.flush()
+        return cls(file, begin, len(content))
+
+    def scene(self) -> Scene:
+        """Read it again."""
+        content = os.pread(self.file.fileno(), self.size, self.begin)
+        held = pickle.loads(zlib.decompress(content))  # noqa: S301 -- nobody else can write there
+        if held["held_out"] is not None:
+            held["held_out"] = evolve(held["held_out"])  # its array is read-only again
+        return Scene(**held)
+
+
 class Shelf(Mapping[str, Scene]):
-    """Name -> scene. Those asked for least recently go when the others take more than `room`.
+    """Name -> scene. Those asked for least recently are put aside when the others take more than `room`.
 
     Parameters
     ----------
@@ -59,6 +97,8 @@ class Shelf(Mapping[str, Scene]):
         self._facts: dict[str, Facts] = {}
         self._held: OrderedDict[str, Scene] = OrderedDict()
         self._taken = 0
+        self._aside: dict[str, _Aside] = {}
+        self._file: IO[bytes] | None = None
 
     @property
     def facts(self) -> Mapping[str, Facts]:
@@ -68,11 +108,16 @@ class Shelf(Mapping[str, Scene]):
     def put(self, scene: Scene, remark: str = "") -> None:
         """Add a scene."""
         self._facts[scene.name] = Facts.of(scene, remark)
+        self._aside.pop(scene.name, None)
         self._hold(scene)
 
     def held(self, name: str) -> Scene | None:
-        """The scene, if it is in memory."""
-        return self._held.get(name)
+        """The scene, if it need not be loaded."""
+        if (scene := self._held.get(name)) is None and name in self._aside:
+            with suppress(OSError, zlib.error, pickle.UnpicklingError):  # a disk that fails: it is loaded
+                scene = self._aside[name].scene()
+                self._hold(scene)
+        return scene
 
     def only(self, names: Collection[str]) -> "Shelf":
         """A shelf with these of the scenes; nothing is loaded."""
@@ -85,7 +130,9 @@ class Shelf(Mapping[str, Scene]):
     def take(self, other: "Shelf", name: str) -> None:
         """Add a scene of another shelf, which is loaded no sooner than it is needed."""
         self._facts[name] = other._facts[name]
-        if (scene := other.held(name)) is not None:
+        if (aside := other._aside.get(name)) is not None:
+            self._aside[name] = aside
+        if (scene := other._held.get(name)) is not None:
             self._hold(scene)
 
     def __getitem__(self, name: str) -> Scene:
@@ -97,7 +144,7 @@ class Shelf(Mapping[str, Scene]):
             If it cannot be loaded again, or has changed since.
         """
         known = self._facts[name]
-        scene = self._held.get(name)
+        scene = self.held(name)
         if scene is None:
             scene = self._load(name)
             if (scene.digest, scene.truth_digest) != (known.digest, known.truth_digest):
@@ -121,7 +168,16 @@ class Shelf(Mapping[str, Scene]):
         self._held[scene.name] = scene
         self._taken += bytes_of(scene)
         while self._taken > self._room and len(self._held) > 1:
-            self._taken -= bytes_of(self._held.popitem(last=False)[1])
+            gone = self._held.popitem(last=False)[1]
+            self._taken -= bytes_of(gone)
+            self._put_aside(gone)
+
+    def _put_aside(self, scene: Scene) -> None:
+        if scene.name in self._aside:
+            return
+        with suppress(OSError):  # there is no room, or no place, for it: it is loaded again
+            self._file = self._file or TemporaryFile()  # noqa: SIM115 -- it is open as long as this shelf is there
+            self._aside[scene.name] = _Aside.put(scene, self._file)
 
 
 def facts_of(scenes: Mapping[str, Scene]) -> Mapping[str, Facts]:
@@ -130,7 +186,7 @@ def facts_of(scenes: Mapping[str, Scene]) -> Mapping[str, Facts]:
 
 
 def held(scenes: Mapping[str, Scene], name: str) -> Scene | None:
-    """The scene, if there is one of that name in memory."""
+    """The scene, if there is one of that name that need not be loaded."""
     return scenes.held(name) if isinstance(scenes, Shelf) else scenes.get(name)
 
 

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import matbench
+from matbench import shelf as module
 from matbench.errors import UserError
 from matbench.scene import Range, Scene
 from matbench.shelf import Facts, Shelf, bytes_of, facts_of, held, only
@@ -40,18 +42,54 @@ def shelf(loading: Loading) -> Shelf:
     return found
 
 
+def in_memory(shelf: Shelf) -> list[str]:
+    return [name for name in shelf if name in shelf._held]
+
+
 def test_what_was_asked_for_least_recently_goes_and_comes_back(shelf: Shelf, loading: Loading) -> None:
     assert (list(shelf), len(shelf), "a" in shelf, "z" in shelf) == (["a", "b", "c"], 3, True, False)
-    assert [held(shelf, name) is not None for name in shelf] == [False, True, True]
+    assert in_memory(shelf) == ["b", "c"]
     assert shelf["b"].name == "b"
-    assert loading.names == []
     assert shelf["a"].digest == made("a").digest
-    assert loading.names == ["a"]
-    assert [shelf.held(name) is not None for name in shelf] == [True, True, False], "c was the last asked for"
+    assert in_memory(shelf) == ["a", "b"], "c was the last asked for"
+    assert held(shelf, "c") is not None
+    assert loading.names == [], "what is put aside is not loaded again"
 
 
-def test_a_pass_over_all_loads_each_at_most_once(shelf: Shelf, loading: Loading) -> None:
+def test_what_is_put_aside_comes_back_as_it_was(loading: Loading) -> None:
+    shelf = Shelf(loading, 1)
+    world = matbench.load_scene("synthetic/world-3[size=48x36 predict=right]")
+    for scene in (world, made("a"), made("b")):
+        shelf.put(scene)
+    assert in_memory(shelf) == ["b"]
+    back = shelf[world.name]
+    assert (back.digest, back.truth_digest, back.name) == (world.digest, world.truth_digest, world.name)
+    assert back.held_out is not None
+    assert world.held_out is not None
+    assert np.array_equal(back.held_out.image, world.held_out.image)
+    for own, other in ((back.regions, world.regions), (back.visible, world.visible), (back.truth, world.truth)):
+        assert own.keys() == other.keys()
+        assert all(np.array_equal(own[key], other[key], equal_nan=True) for key in own)  # type: ignore[index]
+    assert not any(array.flags.writeable for array in (back.views, back.held_out.image, *back.truth.values()))
+    assert loading.names == []
+    shelf.put(made("a", 7))
+    shelf.put(made("b"))
+    assert shelf["a"].views.max() == 7, "put again, it is the new one"
+
+
+def test_where_nothing_can_be_put_aside_each_is_loaded_at_most_once_a_pass(
+    loading: Loading, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr(module, "TemporaryFile", full)
+    shelf = Shelf(loading, ROOM)
+    for name in ("a", "b", "c"):
+        shelf.put(made(name))
+    assert [shelf.held(name) is not None for name in shelf] == [False, True, True]
     assert [scene.name for scene in shelf.values()] == ["a", "b", "c"]
+    assert loading.names
     assert sorted(loading.names) == sorted(set(loading.names))
 
 
@@ -63,7 +101,8 @@ def test_facts_load_nothing(shelf: Shelf, loading: Loading) -> None:
     assert loading.names == []
 
 
-def test_a_scene_that_has_changed_is_refused() -> None:
+def test_a_scene_that_has_changed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Shelf, "_put_aside", lambda *_: None)
     shelf = Shelf(lambda name: made(name, 9), ROOM)
     for name in ("a", "b", "c"):
         shelf.put(made(name))
@@ -76,6 +115,7 @@ def test_some_of_the_scenes_are_a_shelf_of_their_own(shelf: Shelf, loading: Load
     assert list(some) == ["a", "c"]
     assert loading.names == []
     assert some["a"].name == "a"
+    assert loading.names == [], "what was put aside there is known here"
     assert only({"a": made("a"), "b": made("b")}, {"b"}).keys() == {"b"}
 
 
@@ -85,4 +125,4 @@ def test_one_scene_stays_however_large(loading: Loading) -> None:
     assert shelf.held("a") is not None
     shelf.put(made("a"))
     shelf.put(made("b"))
-    assert [shelf.held(name) is not None for name in "ab"] == [False, True]
+    assert in_memory(shelf) == ["b"]
