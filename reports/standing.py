@@ -9,7 +9,7 @@ from attrs import evolve, frozen
 
 from matbench.measures.metrics import Better
 from matbench.measures.statistics import CONFIDENCE, FEW, Effect, paired_effects, together
-from matbench.reports.tables import REGION, Shared, means, merit, per_scene, shared, summary, text, too_silent
+from matbench.reports.tables import REGION, Shared, like, means, merit, per_scene, shared, summary, text, too_silent
 from matbench.spec import witness
 
 REFERENCES = 12
@@ -30,7 +30,7 @@ def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
     are not independent. Scenes in which the region is empty, so that no method has a value, are left out.
     """
     ranked = [m for m in scope.methods if scope.is_ranked(m)]
-    chosen = table.reindex(index=list(scope.scenes), columns=ranked).dropna(how="all")
+    chosen = like(table, scope.scenes, ranked).dropna(how="all")
     names = [witness(str(scene)) for scene in chosen.index]
     if len(set(names)) == len(names):
         return chosen
@@ -41,7 +41,8 @@ def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
 def _ranks(table: pd.DataFrame, scope: Shared, unit: str, better: Better, aside: Collection[str]) -> pd.DataFrame:
     """The ranks of methods on every witness, by the scores as shown: 1 is best, ties share a mean rank."""
     rows = witnesses(table, scope).drop(columns=list(aside), errors="ignore")
-    shown = rows.map(lambda value: float(text(value, unit)) if pd.notna(value) else np.nan)
+    values = [[float(text(v, unit)) if v == v else np.nan for v in row] for row in rows.to_numpy(float).tolist()]
+    shown = pd.DataFrame(np.reshape(values, rows.shape), rows.index, rows.columns, dtype=float)
     return merit(shown, better).rank(axis=1)
 
 
@@ -139,8 +140,9 @@ def differences(tables: Sequence[pd.DataFrame], scope: Shared) -> list[list[Diff
     known = references(scope)
     ranked = [m for m in scope.methods if scope.is_ranked(m)]
     pairs = [(b, a) for a, b in combinations(ranked, 2) if a in known]
-    rows = [witnesses(table, scope) for table in tables]
-    values = [(part[b] - part[a]).to_numpy(float) if len(part) else np.empty(0) for part in rows for b, a in pairs]
+    place = {m: number for number, m in enumerate(ranked)}  # the columns of `witnesses`
+    rows = [witnesses(table, scope).to_numpy(float) for table in tables]  # pandas takes a millisecond for each pair
+    values = [part[:, place[b]] - part[:, place[a]] for part in rows for b, a in pairs]
     effects = iter(together(paired_effects(values), [i for i in range(len(tables)) for _ in pairs]))
     return [[Difference(b, a, next(effects)) for b, a in pairs] for _ in tables]
 
@@ -187,9 +189,16 @@ class Lead:
     compared: int
 
 
-def lead(results: pd.DataFrame, cells: pd.DataFrame, metric: str, better: Better, region: str = REGION) -> Lead:
-    """Find the best ranked method of a run, and how far it is ahead."""
-    rows = summary(results, cells, metric, better)
+def lead(
+    results: pd.DataFrame,
+    cells: pd.DataFrame,
+    metric: str,
+    better: Better,
+    region: str = REGION,
+    rows: pd.DataFrame | None = None,
+) -> Lead:
+    """Find the best ranked method of a run, and how far it is ahead; `rows` as `summary` gives them, if at hand."""
+    rows = summary(results, cells, metric, better) if rows is None else rows
     scope = evolve(shared(results, cells), methods=tuple(str(m) for m in rows.index))
     silent = too_silent(means(results, scope, region, metric, "answered"))
     ranked = [m for m in references(scope) if m not in silent]

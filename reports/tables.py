@@ -1,8 +1,7 @@
 """The tables of a run. Page, terminal and papers all take their numbers from here, so that they agree."""
 
 import re
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import floor
 from typing import TypeVar
 
@@ -13,6 +12,7 @@ from attrs import frozen
 from matbench.measures.metrics import ENOUGH, Better
 from matbench.regions import VIEW_REGIONS
 from matbench.reports import costs
+from matbench.reports.mixture import mixture
 from matbench.results.comparable import counted, is_enough
 from matbench.spec import witness
 
@@ -20,7 +20,6 @@ METRIC, REGION = "total_bad_1", "all"
 THRESHOLD = re.compile(r"(bad|total_bad)_(\d+(?:\.\d+)?)")
 """Metrics that have a threshold in their name, in px of the pair."""
 
-_NUMBERED = re.compile(r"-[0-9]+$")
 REGIONS = ("nonocc", "all", "occ", "disc", "textureless")
 VIEWS = tuple(VIEW_REGIONS)
 Numbers = TypeVar("Numbers", float, pd.Series, pd.DataFrame)
@@ -99,26 +98,8 @@ class Shared:
 
     @property
     def mixture(self) -> str:
-        """How many of the shared scenes are of which kind, as every scene weighs the same; empty if all are of one.
-
-        A kind is a dataset. Of one with scenes that are told apart by a number at the end, such as random worlds, it is
-        what stands before the number.
-
-        >>> Shared(("m",), (), {}, ("a/x", "b/y", "b/z")).mixture
-        'a 1, b 2'
-        >>> Shared(("m",), (), {}, ("a/x", "b/world-1", "b/world-thin-2[n=5]", "b/world-thin-3", "b/box")).mixture
-        'a 1, b/world 1, b/world-thin 2, b/box 1'
-        """
-        names = [witness(scene) for scene in self.scenes]
-        families = [_NUMBERED.sub("", name) for name in names]
-        numbered = {name.partition("/")[0] for name, family in zip(names, families, strict=True) if family != name}
-        datasets = [name.partition("/")[0] for name in names]
-        kinds = [family if of in numbered else of for family, of in zip(families, datasets, strict=True)]
-        for dataset in numbered:  # all of one family: the dataset's name says as much
-            if len({kind for kind, of in zip(kinds, datasets, strict=True) if of == dataset}) == 1:
-                kinds = [of if of == dataset else kind for kind, of in zip(kinds, datasets, strict=True)]
-        counts = Counter(kinds)
-        return ", ".join(f"{kind} {count}" for kind, count in counts.items()) if len(counts) > 1 else ""
+        """How many of the shared scenes are of which kind, as every scene weighs the same; empty if all are of one."""
+        return mixture(self.scenes)
 
     def is_ranked(self, method: str) -> bool:
         """Has the method every shared scene? Only then is it compared with the others."""
@@ -212,14 +193,21 @@ def means(results: pd.DataFrame, scope: Shared, region: str, metric: str, column
 def over_scenes(table: pd.DataFrame, scope: Shared) -> pd.Series:
     """`means` of a table that `per_scene` made."""
     # with arrays: a page asks for hundreds of means, and pandas takes a millisecond for each
-    values = table.reindex(index=list(scope.asked), columns=list(scope.methods)).to_numpy(float)
+    values = like(table, scope.asked, scope.methods).to_numpy(float)
     filled = {scene for scene, row in zip(scope.asked, values, strict=True) if not np.isnan(row).all()}
     places = {scene: number for number, scene in enumerate(scope.asked)}
     found = {}
     for number, method in enumerate(scope.methods):
         rows = [places[scene] for scene in scope.counted(method) if scene in filled]
         found[method] = values[rows, number].mean() if rows else np.nan
-    return pd.Series(found, dtype=float)
+    return pd.Series(list(found.values()), pd.Index(list(found), dtype=object), dtype=float)
+
+
+def like(table: pd.DataFrame, scenes: Sequence[str], methods: Sequence[str]) -> pd.DataFrame:
+    """A table with these rows and columns: itself, where it has them."""
+    if list(table.index) == list(scenes) and list(table.columns) == list(methods):
+        return table
+    return table.reindex(index=list(scenes), columns=list(methods))
 
 
 def count(table: pd.DataFrame, scope: Shared) -> int:

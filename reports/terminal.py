@@ -66,28 +66,29 @@ def tables(
     results, cells = labelled(results), labelled(cells)
     scope = shared(results, cells)
     out = []
+    rows = summary(results, cells, metric, better) if len(results) else pd.DataFrame()
     if scope.methods and len(results):
         heads = {f"{metric} {r}": r.replace("textureless", "texture-\nless") for r in REGIONS}
         heads |= {"avg all": "avg\nall", "seconds": f"{CLOCK}\ntime"}
-        by_region = _summary(results, cells, scope, metric, better, "by region", heads)
+        by_region = _summary(rows, results, cells, scope, metric, better, "by region", heads)
         if width < WIDTH or _least_width(by_region) > width:
             heads = {column: head for column, head in heads.items() if column.split()[-1] not in NARROW}
-            by_region = _summary(results, cells, scope, metric, better, "by region", heads)
+            by_region = _summary(rows, results, cells, scope, metric, better, "by region", heads)
         out.append(by_region)
         over_views = [r for r in summarised(results) if r in VIEWS]
         if per_scene(results, VIEWS[0], metric).notna().any(axis=None):
             heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in over_views}
-            out.append(_summary(results, cells, scope, metric, better, "by the views that see a point", heads))
-        out += _differences(results, cells, metric, better)
+            out.append(_summary(rows, results, cells, scope, metric, better, "by the views that see a point", heads))
+        out += _differences(rows, results, cells, metric, better)
         own = [r for r in regions(results[results["metric"] == metric]) if r not in (*REGIONS, *VIEWS)]
         if own:
             heads = {f"{metric} {r}": r.replace("_", "_\n", 1) for r in own}
-            out.append(_summary(results, cells, scope, metric, better, "by the scenes' own regions", heads, own))
+            out.append(_summary(rows, results, cells, scope, metric, better, "by the scenes' own regions", heads, own))
         measured = [m for m in (metric, *others) if m in set(results["metric"])]
         if len(measured) > 1:
             out += _by_metric(results, cells, scope, measured, {metric: better, **others}, width)
     if len(results):
-        out += _scenes(results, cells, scope, metric, better, width)
+        out += _scenes([str(m) for m in rows.index], results, cells, scope, metric, better, width)
     bad = cells[cells["status"] != "ok"]
     if len(bad):
         out.append(_bad(bad))
@@ -113,6 +114,7 @@ def _number(value: float, unit: str, place: int, is_aside: bool = False) -> Text
 
 
 def _summary(
+    rows: pd.DataFrame,
     results: pd.DataFrame,
     cells: pd.DataFrame,
     scope: Shared,
@@ -122,10 +124,9 @@ def _summary(
     heads: dict[str, str],
     own: Sequence[str] = (),
 ) -> Table:
-    """Methods x the columns of the summary that have a heading; below them, how many scenes each is over."""
-    rows, unit = summary(results, cells, metric, better), metrics(results).get(metric, "%")
-    for region in own:
-        rows[f"{metric} {region}"] = means(results, scope, region, metric).reindex(rows.index)
+    """Methods x the columns of the summary, `rows`, that have a heading; below, how many scenes each is over."""
+    unit = metrics(results).get(metric, "%")
+    rows = rows.assign(**{f"{metric} {r}": means(results, scope, r, metric).reindex(rows.index) for r in own})
     hint = "; too few scenes to conclude" if scope.distinct < FEW else ""
     over = f"{len(scope.scenes)} of {len(scope.asked)} scenes{f' ({scope.mixture})' if scope.mixture else ''}"
     table = plain(f"{metric} ({unit}) {what}, mean over {over}{hint}")
@@ -197,9 +198,11 @@ def _by_metric(
     return out
 
 
-def _differences(results: pd.DataFrame, cells: pd.DataFrame, metric: str, better: Better) -> list[Table]:
+def _differences(
+    rows: pd.DataFrame, results: pd.DataFrame, cells: pd.DataFrame, metric: str, better: Better
+) -> list[Table]:
     """Is it real? The differences from the best method, with intervals and verdicts."""
-    found = lead(results, cells, metric, better)
+    found = lead(results, cells, metric, better, rows=rows)
     if not found.behind:
         return []
     unit = metrics(results).get(metric, "%")
@@ -230,11 +233,16 @@ def _headings(methods: list[str], numbers: dict[str, int], room: int) -> list[st
 
 
 def _scenes(
-    results: pd.DataFrame, cells: pd.DataFrame, scope: Shared, metric: str, better: Better, width: int
+    methods: list[str],
+    results: pd.DataFrame,
+    cells: pd.DataFrame,
+    scope: Shared,
+    metric: str,
+    better: Better,
+    width: int,
 ) -> list[Table]:
     """Scenes x methods, in as many tables as it takes to stay within the width."""
     room = min(width, WIDTH)
-    methods = [str(m) for m in summary(results, cells, metric, better).index]
     unit = metrics(results).get(metric, "%")
     numbers = {m: i for i, m in enumerate(methods, 1)}
     values, answered = (
