@@ -12,7 +12,7 @@ from matbench.algorithm import Context, Estimate
 from matbench.algorithms.cuts.interactions import UNKNOWN, Interactions
 from matbench.algorithms.cuts.lattice import Lattice, disparities, expand_views, surfaces, whole_shifts
 from matbench.algorithms.cuts.moves import Moves
-from matbench.algorithms.kernels import kernel
+from matbench.algorithms.kernels import helper, kernel
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, planes_a_pixel
 from matbench.algorithms.ray_ends import agreement
@@ -28,6 +28,7 @@ SCALE = {
     "shared": 1.0,
     "mccnn": 1.0,
 }  # what a dissimilarity counts at most: grey levels, and all of it
+MANY = 1 << 30  # more than there are planes
 OWN = {"published": 2.0, "shared": 0.05, "mccnn": 0.05}  # smoothness
 
 
@@ -157,23 +158,52 @@ def rate_matches(labels, differences, shifts, hidden, limit, top, end, out):  # 
         (H, views, planes, W) int32.
     """
     _, views, width = labels.shape
-    places = np.empty(views, np.int64)
+    before, sees = np.empty(width, np.int32), np.empty(width, np.int32)
+    seeing, compared, total = np.empty(width, np.int32), np.empty(width, np.int32), np.empty(width, np.int32)
     for y in range(top, end):
         for i in range(views):
             for k in range(out.shape[2]):
                 for x in range(width):
-                    seeing, compared, total = 0, 0, 0
-                    for j in range(views):
-                        at = x + shifts[i, j, k]
-                        sees = 0 <= at < width and (j == i or labels[y, j, at] <= k)
-                        places[j] = at if sees else -1
-                        seeing += sees
-                        if j > 0 and sees and places[j - 1] >= 0:
-                            # what is nearer to view i counts: after rounding, the two need not be homologues
-                            left = places[j - 1] if i < j else at - shifts[j - 1, j, k]
-                            inside = 0 <= left < width
-                            difference = np.int64(differences[j - 1, y, k, left]) if inside else np.int64(UNKNOWN)
-                            if difference != UNKNOWN:
-                                total += min(difference, limit)
-                                compared += 1
-                    out[y, i, k, x] = hidden * (views - seeing) + (total // compared if compared > 0 else 0)
+                    before[x], seeing[x], compared[x], total[x] = 0, 0, 0, 0
+                for j in range(views):
+                    shift = shifts[i, j, k]
+                    _see(labels[y, j], shift, MANY if j == i else k, sees)
+                    for x in range(width):
+                        seeing[x] += sees[x]
+                    if j > 0:
+                        # what is nearer to view i counts: after rounding, the two need not be homologues
+                        left = shifts[i, j - 1, k] if i < j else shift - shifts[j - 1, j, k]
+                        _compare(differences[j - 1, y, k], left, limit, before, sees, compared, total)
+                    before, sees = sees, before
+                for x in range(width):
+                    # the quotient of numbers as small as these is exact enough to be rounded down
+                    mean = np.int32(np.float64(total[x]) / max(compared[x], 1))
+                    out[y, i, k, x] = hidden * (views - seeing[x]) + mean
+
+
+@helper
+def _see(labels, shift, k, sees):  # type: ignore[no-untyped-def]
+    """sees <- is a pixel's homologue in the picture, and its label at most k?"""
+    width = sees.size
+    low, high = min(max(-shift, 0), width), max(min(width - shift, width), 0)
+    for x in range(width):
+        sees[x] = 0
+    if low < high:  # slices, so that nothing but what is added up depends on where they begin
+        there, here = labels[low + shift : high + shift], sees[low:high]
+        for x in range(here.size):
+            here[x] = there[x] <= k
+
+
+@helper
+def _compare(differences, shift, limit, one, other, compared, total):  # type: ignore[no-untyped-def]
+    """Where both views see the point and their difference is known, count it, and add it up to the limit."""
+    width = total.size
+    low, high = max(-shift, 0), min(width - shift, width)
+    if low >= high:
+        return
+    values, first, second = differences[low + shift : high + shift], one[low:high], other[low:high]
+    number, amount = compared[low:high], total[low:high]
+    for x in range(values.size):
+        counts = first[x] & second[x] & np.int32(values[x] != UNKNOWN)
+        number[x] += counts
+        amount[x] += counts * min(np.int32(values[x]), np.int32(limit))

@@ -82,21 +82,23 @@ def merge(member, nodes, links, excess, left, start, sorted_links):  # type: ign
         left[u] = 0
     for u in range(member.size):
         left[member[u]] += excess[u]
+    parted = 0
     for k in range(links.shape[1]):
-        u, v = member[links[0, k]], member[links[1, k]]
-        if u != v:
-            start[min(u, v) + 1] += 1
+        u, v, forth, back = member[links[0, k]], member[links[1, k]], links[2, k], links[3, k]
+        if u == v:
+            continue
+        if u > v:
+            u, v, forth, back = v, u, back, forth
+        links[0, parted], links[1, parted], links[2, parted], links[3, parted] = u, v, forth, back
+        parted += 1
+        start[u + 1] += 1
     for u in range(nodes):
         start[u + 1] += start[u]
     place = start[:-1].copy()
-    for k in range(links.shape[1]):
-        u, v = member[links[0, k]], member[links[1, k]]
-        if u == v:
-            continue
-        at = place[min(u, v)]
-        place[min(u, v)] += 1
-        sorted_links[1, at] = max(u, v)
-        sorted_links[2, at], sorted_links[3, at] = (links[2, k], links[3, k]) if u < v else (links[3, k], links[2, k])
+    for k in range(parted):
+        at = place[links[0, k]]
+        place[links[0, k]] += 1
+        sorted_links[1, at], sorted_links[2, at], sorted_links[3, at] = links[1, k], links[2, k], links[3, k]
     # where the link to a node is, if it is one of the tail's
     found = np.full(nodes, -1, np.int32)
     count = 0

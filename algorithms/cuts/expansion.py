@@ -131,13 +131,12 @@ def expand_from(
                 network = Network.of(left, *needed)
             else:
                 network = Network.of(excess, *needed)
-            keeps = minimum_cut(network, flow, threads, blocks).sources[member].reshape(labels.shape)
-            moved = np.where(keeps, labels, np.int32(alpha))
-            then = energy(moved)
-            expansions, arcs = expansions + 1, arcs + network.arcs
-            idle = 0 if then < now else idle + 1
-            if then < now:
-                labels, now = moved, then
+            cut = minimum_cut(network, flow, threads, blocks)
+            expansions, arcs, gain = expansions + 1, arcs + network.arcs, network.taken - cut.flow
+            idle = 0 if gain else idle + 1
+            if gain:
+                keeps = cut.sources[member].reshape(labels.shape)
+                labels, now = np.where(keeps, labels, np.int32(alpha)), now - gain
             if idle == planes:
                 break
         energies.append(mean(now))

@@ -5,15 +5,17 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Literal
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from matbench.algorithms.cuts.boykov_kolmogorov import FREE, push_flow
+from matbench.algorithms.cuts.handing_on import hand_on
 from matbench.algorithms.cuts.network import Network
 
 Flow = Literal["trees", "scipy", "ortools"]
+SWEEPS = 4  # of `hand_on` at most, before trees grow
 
 
 @frozen(eq=False)
@@ -51,6 +53,7 @@ def minimum_cut(network: Network, by: Flow = "trees", threads: int = 1, blocks: 
 def _by_trees(network: Network, threads: int, blocks: int) -> Cut:
     nodes = network.excess.size
     capacity, excess = network.capacity.copy(), network.excess.copy()
+    hand_on(network.start, network.head, network.sister, capacity, excess, SWEEPS)
     parent, stamp, depth, queue, orphans = (np.empty(nodes, np.int32) for _ in range(5))
     is_sink, waiting = np.empty(nodes, bool), np.empty(nodes, bool)
 
@@ -62,7 +65,9 @@ def _by_trees(network: Network, threads: int, blocks: int) -> Cut:
             )
         )  # fmt: skip
 
-    value, bounds = 0, [nodes * block // blocks for block in range(blocks + 1)]
+    # what flowed already: all cuts cost less by it, also the one around the sink
+    value = network.taken - evolve(network, excess=excess).taken
+    bounds = [nodes * block // blocks for block in range(blocks + 1)]
     if blocks > 1:
         with ThreadPoolExecutor(max(1, threads)) as pool:
             value += sum(pool.map(push, bounds[:-1], bounds[1:]))

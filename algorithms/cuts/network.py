@@ -56,6 +56,11 @@ class Network:
         """Pairs of nodes that are linked."""
         return self.head.size // 2
 
+    @property
+    def taken(self) -> int:
+        """What the sink takes of all nodes together at most: the capacity of the cut around it."""
+        return -int(np.minimum(self.excess, 0).sum(dtype=np.int64))
+
     def value(self, sources: NDArray[np.bool_]) -> int:
         """The capacity of a cut: of all arcs that leave the source side."""
         tails = np.repeat(np.arange(self.excess.size), np.diff(self.start))
