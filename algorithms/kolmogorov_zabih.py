@@ -12,7 +12,7 @@ from matbench.algorithm import Context, Estimate
 from matbench.algorithms.cuts.interactions import Interactions
 from matbench.algorithms.cuts.lattice import Lattice, disparities, expand_views, surfaces
 from matbench.algorithms.cuts.moves import Moves
-from matbench.algorithms.parameters import all_or_several, planes_a_pixel
+from matbench.algorithms.parameters import all_or_several, planes_a_pixel, unread
 from matbench.algorithms.ray_ends import agreement
 from matbench.algorithms.sampling import search_space
 from matbench.algorithms.similarity import PairSet
@@ -23,7 +23,7 @@ from matbench.parameters import flat
 from matbench.scene import Scene
 
 OWN = {"published": 0.0, "shared": 0.38, "mccnn": 0.38}  # reward of similar pixels; 0 = from the images
-EXACT = 0.4  # of the authors' rule for it, which was made for ranges of colours: these differ less than the colours
+EXACT = 0.4  # of the authors' rule for it, unless ranges of colours are compared, as there: they differ less
 
 
 @flat
@@ -62,6 +62,9 @@ class KolmogorovZabih:
     reward
         K, what the most similar pixels earn, in squared grey levels (the largest 511) or, if `similarity` is
         another, in shares of 1. 0 = 0.4 times the mean of one of the smallest differences of each pixel, or 0.38.
+    ranges
+        Compare ranges of colours, as the authors' program does, so that it matters less where pixels lie (Birchfield
+        & Tomasi 1998). D is that of 30 grey levels at most then, and the reward the whole mean of that rule.
     step
         How many planes a change of plane counts at most; with 1 every change costs the same (Potts).
     """
@@ -73,6 +76,7 @@ class KolmogorovZabih:
     fineness: int = field(default=0, validator=planes_a_pixel)
     pairs: PairSet = field(default="consecutive", validator=validators.in_(get_args(PairSet)))
     reward: float = field(default=0.0, validator=[validators.ge(0), validators.le(511)])
+    ranges: bool = False
     prices: Smoothness = field(factory=partial(Smoothness, flat=3.0))
     step: int = field(default=1, validator=validators.ge(1))
     moves: Moves = field(factory=Moves)
@@ -80,7 +84,8 @@ class KolmogorovZabih:
     @property
     def silent(self) -> Mapping[str, str]:
         """The parameters that are not read beside the others -> what they take to be read."""
-        return self.prices.silent
+        takes = {"ranges": (self.similarity == "published", "similarity=published")}
+        return {**self.prices.silent, **unread(takes)}
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """The maps of all views that are used."""
@@ -88,8 +93,9 @@ class KolmogorovZabih:
         chosen = scene.choose(indices)
         space = search_space(chosen, self.fineness)
         pairs = view_pairs(chosen.n, self.pairs, chosen.ref)
-        between = Interactions.of(chosen, space, pairs, self.similarity, context.threads)
-        reward = self.reward or OWN[self.similarity] or EXACT * between.usual_difference()
+        between = Interactions.of(chosen, space, pairs, self.similarity, context.threads, by_ranges=self.ranges)
+        rule = 1.0 if self.ranges else EXACT
+        reward = self.reward or OWN[self.similarity] or rule * between.usual_difference()
         weights = [self.prices.weights(view, reward / 5) for view in chosen.views]
         down, right = (np.rint(np.stack(part) * between.units).astype(np.int32) for part in zip(*weights, strict=True))
         nothing = np.zeros((0, 0, 0, 0), np.int32)

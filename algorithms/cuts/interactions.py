@@ -8,6 +8,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from matbench.algorithms.cuts.lattice import whole_shifts
+from matbench.algorithms.cuts.ranges import Ranges
 from matbench.algorithms.fusion import Fusion
 from matbench.algorithms.kernels import kernel
 from matbench.algorithms.parallel import over_rows
@@ -84,19 +85,21 @@ class Interactions:
         similarity: Source,
         threads: int,
         difference: Difference = "squared",
+        by_ranges: bool = False,
     ) -> "Interactions":
         """Compare homologous pixels in all planes.
 
         They are compared exactly where they are, between pixels too, from the whole pixels of either view; the mean
         counts. ``published``: a `difference` of colours, see `Costs`. ``shared``: 1 - rho_ij over adaptive
         windows, of which the first costs of materiality and its control are made (`Fusion.first_cost`); ``mccnn``:
-        the same of learned similarities.
+        the same of learned similarities. With `by_ranges` colours count as squared differences of `Ranges`.
         """
         shifts, units = whole_shifts(space, pairs), UNITS[difference if similarity == "published" else similarity]
         out = np.empty((len(pairs), space.rows, space.planes, space.width), np.uint16)
         sweep = Sweep.of(scene, Costs(similarity, scene.n, space.fineness, difference), threads)
         phases = None if sweep.matcher is None else sweep.matcher.phases()
-        seen = partial(_differences, sweep, phases, threads)
+        ranges = Ranges.of(sweep.phases) if by_ranges and sweep.matcher is None else None
+        seen = partial(_differences, sweep, phases, ranges, threads)
         for p, (i, j) in enumerate(pairs.tolist()):
             join = partial(join_ways, seen(i, j), seen(j, i), shifts[p], np.float32(units))
             over_rows(lambda top, end, join=join, out=out[p]: join(top, end, out), space.rows, threads)  # type: ignore[misc]
@@ -124,7 +127,9 @@ class Interactions:
         return np.stack([np.minimum(part, limit).astype(np.int16) - np.int16(limit) for part in self.differences])
 
 
-def _differences(sweep: Sweep, phases: Features | None, threads: int, i: int, j: int) -> NDArray[np.float32]:
+def _differences(
+    sweep: Sweep, phases: Features | None, ranges: Ranges | None, threads: int, i: int, j: int
+) -> NDArray[np.float32]:
     """(H, planes, W) what the pixels of view i and their homologues in view j differ by; NaN outside view j."""
     space, own = sweep.space, sweep.with_reference(i)
     if own.matcher is not None:
@@ -138,7 +143,7 @@ def _differences(sweep: Sweep, phases: Features | None, threads: int, i: int, j:
 
     def compare(first: int, end: int) -> None:
         for plane in range(first, end):
-            out[:, plane] = own.difference(j, plane)
+            out[:, plane] = own.difference(j, plane) if ranges is None else ranges.difference(own, j, plane)
 
     over_rows(compare, space.planes, threads, 1)
     return out

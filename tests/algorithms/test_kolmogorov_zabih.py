@@ -23,6 +23,23 @@ def test_a_box_and_what_it_hides_are_found_in_all_views(pairs, similarity):
     assert max(wrong) < 0.1
 
 
+def test_ranges_find_a_box_too_and_are_read_beside_the_methods_own_costs_only():
+    scene = box_before_wall(height=20, width=50)
+    estimate = KolmogorovZabih(ranges=True).solve(scene, Context())
+    assert estimate.work["violations"] == 0
+    assert np.mean(np.abs(estimate.disparity[scene.ref] - scene.truth[scene.ref]) > 0.5) < 0.05
+    assert "ranges" not in KolmogorovZabih(ranges=True).silent
+    assert KolmogorovZabih(similarity="shared").silent["ranges"] == "similarity=published"
+
+
+def test_with_ranges_and_reference_pairs_the_figures_of_a_prototype_are_reached(data_root):
+    scene = load_scene("middlebury2001/tsukuba", data=data_root)
+    estimate = KolmogorovZabih(pairs="reference", ranges=True, rounds=2).solve(scene, Context(volume=False))
+    wrong = ~(np.abs(estimate.disparity[scene.ref] - scene.truth[scene.ref]) * scene.pair_steps <= 1)
+    for region, figure in (("nonocc", 1.7), ("all", 2.4), ("occ", 29)):
+        assert 100 * wrong[scene.regions[region]].mean() < figure * 1.1
+
+
 @pytest.mark.parametrize("name", ["box", "slanted", "fence"])
 @pytest.mark.parametrize("pairs", ["consecutive", "all"])
 def test_nothing_is_violated_on_scenes_of_fine_planes(name, pairs):

@@ -95,6 +95,39 @@ PLANTS = (
             ),
         ),
     ),
+    Plant(
+        "uniting",
+        "algorithms/cuts/contraction.py",
+        (
+            (
+                "    for k in range(tails.size):\n        if forth",
+                f"    for turn in {_again('tails.size')}:\n        k = turn % tails.size\n        if forth",
+            ),
+            (
+                "    for u in range(member.size):\n        member[u] = member[member[u]]  #",
+                f"    for turn in {_again('member.size')}:\n        u = turn % member.size\n"
+                "        member[u] = member[member[u]]  #",
+            ),
+        ),
+    ),
+    Plant(
+        "contraction",
+        "algorithms/cuts/contraction.py",
+        (
+            (
+                "    nodes = unite(*links, member)\n",
+                "    part = links[:, : (links.shape[1] * 3 + 9) // 10]\n    nodes = unite(*part, member)\n"
+                "    more = np.zeros(nodes + 1, np.int32), np.empty_like(part)\n"
+                "    merge(member, nodes, part.copy(), excess, left, *more)\n"
+                "    nodes = unite(*links, member)\n",
+            ),
+        ),
+    ),
+    Plant(
+        "handing on",
+        "algorithms/cuts/handing_on.py",
+        (("    for sweep in range(2 * sweeps):\n", f"    for sweep in {_again('2 * sweeps')}:\n"),),
+    ),
 )
 
 

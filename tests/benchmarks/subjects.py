@@ -220,6 +220,52 @@ def voxel_pooling() -> Work:
     return partial(kernel, images, unmarked, starts, 1, space.fineness, sums, 0, space.rows)
 
 
+@cache
+def _links() -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Excess and links of a move of all views to a farther plane, from one plane everywhere."""
+    lattice = _of("cuts.lattice", "Lattice")
+    space = _of("sampling", "search_space")(_large())
+    rng, shape = np.random.default_rng(0), (space.rows, space.views, space.planes, space.width)
+    pairs = np.array([(view, view + 1) for view in range(space.views - 1)])
+    down, right = (np.full((space.views, space.rows - one, space.width - 1 + one), 9, np.int32) for one in (1, 0))
+    labels = np.full((space.rows, space.views, space.width), space.planes - 2, np.int32)
+    excess, links = np.empty(labels.size, np.int32), np.empty((4, 20 * labels.size), np.int32)
+    given = lattice(
+        pairs, _of("cuts.lattice", "whole_shifts")(space, pairs), np.zeros((0, 0, 0, 0), np.int16),
+        rng.integers(0, 99, shape).astype(np.int32), down, right, 1, 1.0,
+    )  # fmt: skip
+    count = given.link(labels, 1, excess, links)
+    return excess, links[:, :count].copy()
+
+
+def uniting() -> Work:
+    excess, links = _links()
+    return partial(_of("cuts.contraction", "unite"), *links, np.empty_like(excess))
+
+
+def contraction() -> Work:
+    excess, links = _links()
+    kernel, room = _of("cuts.contraction", "contract"), np.empty_like(links)
+
+    def work() -> None:
+        np.copyto(room, links)
+        kernel(excess, room)
+
+    return work
+
+
+def handing_on() -> Work:
+    network = _of("cuts.network", "Network").of(_links()[0], *_links()[1])
+    kernel, capacity, excess = _of("cuts.handing_on", "hand_on"), network.capacity.copy(), network.excess.copy()
+
+    def work() -> None:
+        np.copyto(capacity, network.capacity)
+        np.copyto(excess, network.excess)
+        kernel(network.start, network.head, network.sister, capacity, excess, 5)
+
+    return work
+
+
 KERNELS: Mapping[str, Callable[[], Work]] = {
     "mixed similarities": mixed_similarities,
     "ssd similarities": ssd_similarities,
@@ -238,4 +284,7 @@ KERNELS: Mapping[str, Callable[[], Work]] = {
     "visible cost": visible_cost,
     "edge weights": edge_weights,
     "voxel pooling": voxel_pooling,
+    "uniting": uniting,
+    "contraction": contraction,
+    "handing on": handing_on,
 }
