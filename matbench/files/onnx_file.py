@@ -120,7 +120,7 @@ def read_model(path: Path) -> Model:
     try:
         data = read_plain(path, most=LARGEST)
     except NotPlain as error:
-        raise UserError(f"model {path}: {error}") from None
+        raise UserError(f"model {path} {str(error).removeprefix(f'{path.name} ')}") from None
     except OSError as error:
         raise UserError(f"model {path} cannot be read: {cause(error)}") from None
     try:

@@ -133,8 +133,9 @@ def test_a_damaged_file_is_refused_in_one_line(data: bytes, tmp_path: Path) -> N
 
 def test_what_is_no_file_is_refused_in_one_line(tmp_path: Path) -> None:
     for path, words in ((tmp_path, "is a folder"), (tmp_path / "none", "No such file")):
-        with pytest.raises(UserError, match=words):
+        with pytest.raises(UserError, match=words) as told:
             read_model(path)
+        assert str(told.value).count(str(path)) == 1
 
 
 def test_hidden_characters_of_names_are_not_printed(tmp_path: Path) -> None:
