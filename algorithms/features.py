@@ -3,12 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from matbench.algorithms.kernels import fill, helper, kernel
+from matbench.algorithms.kernels import helper, kernel
 
 CENSUS_RADIUS = 3  # 7x7 pixels
 CENSUS_BITS = (2 * CENSUS_RADIUS + 1) ** 2 - 1
-WORD = 16  # bits
+WORD = 8  # bits: bytes are counted fastest, as most of them fit a vector
 CENSUS_WORDS = CENSUS_BITS // WORD
+UNITS = 64  # of a grey level, where it is kept as a whole number
+SHIFTS = 32, 160  # grey levels added to samples and slopes: no cubic overshoot, and no slope, is less than that below 0
 LUMA = (0.299, 0.587, 0.114)
 
 
@@ -25,11 +27,16 @@ def gradient(grey: NDArray[np.float32], fineness: int) -> NDArray[np.float32]:
     return np.asarray((wide[..., 2 * q :] - wide[..., : -2 * q]) * np.float32(0.5), np.float32)
 
 
+def whole(values: NDArray[np.float32], shift: float) -> NDArray[np.uint16]:
+    """Grey levels as whole numbers of `UNITS`, from `shift` below 0 on: twice as many fit a vector."""
+    return np.asarray(np.rint((values + np.float32(shift)) * np.float32(UNITS)), np.uint16)
+
+
 @helper
 def _mark_darker(taps, centre, bits):  # type: ignore[no-untyped-def]
-    one = np.uint16(1)
+    one = np.uint8(1)
     for x in range(centre.size):
-        bits[x] = np.uint16(bits[x] << one) | np.uint16(taps[x] < centre[x])
+        bits[x] = np.uint8(bits[x] << one) | np.uint8(taps[x] < centre[x])
 
 
 @kernel
@@ -49,37 +56,36 @@ def _census(wide, fineness, bits):  # type: ignore[no-untyped-def]
                         number += 1
 
 
-def census(grey: NDArray[np.float32], fineness: int) -> NDArray[np.uint16]:
-    """(views, 3, H, samples) census: one bit for each of the 48 pixels around, set where it is darker.
+def census(grey: NDArray[np.float32], fineness: int) -> NDArray[np.uint8]:
+    """(views, 6, H, samples) census: one bit for each of the 48 pixels around, set where it is darker.
 
-    The 7x7 pixels are taken row by row from the upper left one, 16 to a word, the first in the
+    The 7x7 pixels are taken row by row from the upper left one, 8 to a word, the first in the
     highest bit. Pixels are `fineness` samples apart; beyond the image's edge its last sample is repeated.
     """
     reach = CENSUS_RADIUS * fineness
     wide = np.pad(grey, ((0, 0), (0, 0), (reach, reach)), mode="edge")
-    bits = np.zeros((len(grey), CENSUS_WORDS, *grey.shape[1:]), np.uint16)
+    bits = np.zeros((len(grey), CENSUS_WORDS, *grey.shape[1:]), np.uint8)
     _census(wide, fineness, bits)
     return bits
 
 
 @helper
-def _widen(taps, centre, most, gap):  # type: ignore[no-untyped-def]
-    for x in range(centre.size):
-        gap[x] = max(gap[x], abs(taps[x] - centre[x]) - most)
-
-
-@helper
-def _push(gap, near, bits):  # type: ignore[no-untyped-def]
-    one, zero = np.uint16(1), np.float32(0)
-    for x in range(bits.size):
-        bits[x] = np.uint16(bits[x] << one) | np.uint16(near or gap[x] <= zero)
+def _mark_alike(wide, row, other, first, start, most, channels, bits):  # type: ignore[no-untyped-def]
+    """Pushes a bit: does no channel of the samples from `start` of the row `other` differ by more than `most`?"""
+    kind, one = np.uint16, np.uint8(1)
+    for x in range(np.uintp(bits.size)):
+        here, there = x + np.uintp(first), x + np.uintp(start)
+        gap = kind(0)
+        for c in range(len(channels)):
+            a, b = wide[c, row, here], wide[c, other, there]
+            gap = max(gap, kind(max(a, b) - min(a, b)))
+        bits[x] = np.uint8(bits[x] << one) | np.uint8(gap <= most)
 
 
 @kernel
-def _mark_same_surface(wide, fineness, most, bits):  # type: ignore[no-untyped-def]
-    views, _, height, samples = bits.shape
-    middle = CENSUS_RADIUS * fineness
-    gap = np.empty(samples, np.float32)
+def _mark_same_surface(wide, fineness, most, channels, bits):  # type: ignore[no-untyped-def]
+    views, _, height, _ = bits.shape
+    middle, any_gap = CENSUS_RADIUS * fineness, np.uint16(65535)
     for i in range(views):
         for y in range(height):
             number = 0
@@ -88,25 +94,18 @@ def _mark_same_surface(wide, fineness, most, bits):  # type: ignore[no-untyped-d
                 for dx in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
                     if dy == 0 and dx == 0:
                         continue
-                    fill(-most, gap)
+                    limit = any_gap if abs(dx) <= 1 and abs(dy) <= 1 else most
                     start = middle + dx * fineness
-                    for c in range(wide.shape[1]):
-                        _widen(
-                            wide[i, c, other, start : start + samples],
-                            wide[i, c, y, middle : middle + samples],
-                            most,
-                            gap,
-                        )
-                    _push(gap, abs(dx) <= 1 and abs(dy) <= 1, bits[i, number // WORD, y])
+                    _mark_alike(wide[i], y, other, middle, start, limit, channels, bits[i, number // WORD, y])
                     number += 1
 
 
-def same_surface(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.uint16]:
-    """(views, 3, H, samples) which of the 48 pixels of a census are likely on the same surface as the middle one.
+def same_surface(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.uint8]:
+    """(views, 6, H, samples) which of the 48 pixels of a census are likely on the same surface as the middle one.
 
     A bit is set for each of the eight next to it, and for each whose channels all differ by at most
-    `most` grey levels. Across a depth jump pixels move differently between the views, so they say
-    nothing about the middle one; their colour tends to differ. Bits are in the order of `census`.
+    `most` grey levels, both rounded to `UNITS`. Across a depth jump pixels move differently between the views, so
+    they say nothing about the middle one; their colour tends to differ. Bits are in the order of `census`.
 
     Parameters
     ----------
@@ -114,7 +113,8 @@ def same_surface(rows: NDArray[np.float32], fineness: int, most: float) -> NDArr
         (views, channels, H, samples) colours or luma.
     """
     reach = CENSUS_RADIUS * fineness
-    wide = np.pad(rows, ((0, 0), (0, 0), (0, 0), (reach, reach)), mode="edge")
-    bits = np.zeros((len(rows), CENSUS_WORDS, *rows.shape[2:]), np.uint16)
-    _mark_same_surface(wide, fineness, np.float32(most), bits)
+    wide = np.pad(whole(rows, SHIFTS[0]), ((0, 0), (0, 0), (0, 0), (reach, reach)), mode="edge")
+    bits = np.zeros((len(rows), CENSUS_WORDS, *rows.shape[2:]), np.uint8)
+    limit = np.uint16(min(round(most * UNITS), 65535))
+    _mark_same_surface(wide, fineness, limit, (0,) * rows.shape[1], bits)
     return bits

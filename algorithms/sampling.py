@@ -51,7 +51,7 @@ def fine_rows(images: NDArray[np.uint8], fineness: int) -> NDArray[np.float32]:
     return fine
 
 
-def by_phase(values: NDArray[np.generic], fineness: int) -> NDArray[np.generic]:
+def by_phase(values: NDArray[np.generic], fineness: int, spare: int = 0) -> NDArray[np.generic]:
     """Sort finely sampled rows by their phase within a pixel, so that samples a pixel apart lie side by side.
 
     Parameters
@@ -60,14 +60,16 @@ def by_phase(values: NDArray[np.generic], fineness: int) -> NDArray[np.generic]:
         (n, ..., q * (W - 1) + 1), such as from `fine_rows`.
     fineness
         q.
+    spare
+        Columns of 0 after the last pixel.
 
     Returns
     -------
-    (n, q, ..., W): sample ``q * x + phase`` of a row at ``[:, phase, ..., x]``; 0 where that lies
+    (n, q, ..., W + spare): sample ``q * x + phase`` of a row at ``[:, phase, ..., x]``; 0 where that lies
     beyond the last pixel.
     """
     width = (values.shape[-1] - 1) // fineness + 1
-    out = np.zeros((values.shape[0], fineness, *values.shape[1:-1], width), values.dtype)
+    out = np.zeros((values.shape[0], fineness, *values.shape[1:-1], width + spare), values.dtype)
     for phase in range(fineness):
         part = values[..., phase::fineness]
         out[:, phase, ..., : part.shape[-1]] = part

@@ -10,9 +10,10 @@ from attrs import evolve, field, frozen, validators
 from numpy.typing import NDArray
 
 from matbench.algorithms import mccnn
-from matbench.algorithms.features import census, gradient, luma, same_surface
+from matbench.algorithms.features import SHIFTS, census, gradient, luma, same_surface, whole
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel, unread
+from matbench.algorithms.pixels import PIXELS, compare_pixels, most_costly
 from matbench.algorithms.sampling import by_phase, fine_rows, search_space
 from matbench.algorithms.windows import (
     CENSUS,
@@ -141,8 +142,8 @@ class Matcher:
     pairs: NDArray[np.int64]
     rows: NDArray[np.float32]
     slopes: NDArray[np.float32]
-    bits: NDArray[np.uint16]
-    masks: NDArray[np.uint16]
+    bits: NDArray[np.uint8]
+    masks: NDArray[np.uint8]
     descriptors: NDArray[np.int8]
     settings: Matching
 
@@ -228,6 +229,16 @@ class Matcher:
     def _all_ray_spans(self) -> list[NDArray[np.int64]]:
         return [self.ray_spans(i, j) for i, j in self.pairs]
 
+    @cached_property
+    def _stacked_ray_spans(self) -> NDArray[np.int64]:
+        return np.stack(self._all_ray_spans)
+
+    @cached_property
+    def _compared(self) -> tuple[NDArray[np.generic], ...]:
+        """What views are compared by: rows, slopes, bits and masks as `Features` have them."""
+        rows = whole(self.rows, SHIFTS[0]) if self.settings.similarity == "mixed" else self.rows
+        return rows, whole(self.slopes, SHIFTS[1]), self.bits, self.masks
+
     def disparity(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
         """Fractional plane indices of the space as disparities in pixels per view step of the given scene."""
         scale = np.float32(1 / (self.space.fineness * self.step))
@@ -255,9 +266,15 @@ class Matcher:
         window
             Side of the window in pixels, if it is not that of the settings.
         """
-        space = self.space
-        out = np.zeros((end - first, len(self.pairs), space.planes, space.width), np.uint8)
-        self._compare(phases, first, out, on_rays=True, window=window)
+        space, settings = self.space, self.settings
+        shape = end - first, len(self.pairs), space.planes, space.width
+        if settings.similarity == "mixed" and (settings.window if window is None else window) == 1:
+            out, channels = np.empty(shape, np.uint8), (0,) * phases.rows.shape[2]
+            limit, masked = most_costly(len(channels), settings.truncation), (0,) * bool(phases.masks.size)
+            compare_pixels(phases, self.pairs, masked, channels, limit, self._stacked_ray_spans, first, out)
+        else:
+            out = np.zeros(shape, np.uint8)
+            self._compare(phases, first, out, on_rays=True, window=window)
         return out
 
     def all(self, threads: int = 1) -> NDArray[np.uint8]:
@@ -269,13 +286,13 @@ class Matcher:
 
     def phases(self) -> Features:
         """Rows and their features sorted by phase within a pixel, so that every q-th sample is read contiguously."""
-        parts = (by_phase(part, self.space.fineness) for part in (self.rows, self.slopes, self.bits, self.masks))
+        spare = PIXELS if self.settings.similarity == "mixed" else 0
+        parts = (by_phase(part, self.space.fineness, spare) for part in self._compared)
         return Features(*parts, self.descriptors)  # type: ignore[call-arg, arg-type]
 
     def _fill(self, first: int, out: NDArray[np.uint8]) -> None:
-        sorted_ones = (self.rows[:, None], self.slopes[:, None], self.bits[:, None], self.masks[:, None])
-        whole = Features(*sorted_ones, self.descriptors)
-        self._compare(whole, first, out, on_rays=False)
+        unsorted = Features(*(part[:, None] for part in self._compared), self.descriptors)  # type: ignore[call-arg, arg-type]
+        self._compare(unsorted, first, out, on_rays=False)
 
     def _compare(
         self, features: Features, first: int, out: NDArray[np.uint8], on_rays: bool, window: int | None = None

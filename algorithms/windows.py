@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from matbench.algorithms.features import CENSUS_BITS, CENSUS_WORDS
+from matbench.algorithms.features import CENSUS_BITS, CENSUS_WORDS, UNITS
 from matbench.algorithms.kernels import fill, helper, inlined, kernel, popcount
 from matbench.algorithms.mccnn import CHANNELS, STEPS
 
@@ -28,20 +28,21 @@ class Features(NamedTuple):
     Parameters
     ----------
     rows
-        (views, phases, channels, H, samples) float32 colours or luma, in grey levels.
+        (views, phases, channels, H, samples) colours or luma: float32, in grey levels, or for ``mixed`` uint16
+        (`whole`).
     slopes
-        (views, phases, H, samples) float32 horizontal gradients of the luma.
+        (views, phases, H, samples) uint16 horizontal gradients of the luma (`whole`).
     bits, masks
-        (views, phases, words, H, samples) uint16: census of the luma, and which of its pixels are likely
+        (views, phases, words, H, samples) uint8: census of the luma, and which of its pixels are likely
         on the same surface as the middle one.
     descriptors
         (views, H, all samples, 64) int8, see `mccnn.descriptors`; not sorted, as each is read as a whole.
     """
 
-    rows: NDArray[np.float32]
-    slopes: NDArray[np.float32]
-    bits: NDArray[np.uint16]
-    masks: NDArray[np.uint16]
+    rows: NDArray[np.float32] | NDArray[np.uint16]
+    slopes: NDArray[np.uint16]
+    bits: NDArray[np.uint8]
+    masks: NDArray[np.uint8]
     descriptors: NDArray[np.int8]
 
     def of(self, view: int) -> "Features":
@@ -92,29 +93,30 @@ def square_difference(left, right, fi, ui, fj, uj, row, channels, limit, out):  
 
 
 @helper
-def _count_differing(left, right, fi, ui, fj, uj, row, differing):  # type: ignore[no-untyped-def]
+def count_differing(left, right, fi, ui, fj, uj, row, differing):  # type: ignore[no-untyped-def]
     """How many of the census bits of two pixels differ."""
-    # words of 16 bits, here and below: twice as many of them fit a vector as of 32
+    kind = np.uint8
     for x in range(np.uintp(differing.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
-        count = np.uint16(0)
+        count = kind(0)
         for word in range(CENSUS_WORDS):
-            count = np.uint16(count + popcount(np.uint16(left[fi, word, row, i] ^ right[fj, word, row, j])))
+            count = kind(count + popcount(kind(left[fi, word, row, i] ^ right[fj, word, row, j])))
         differing[x] = count
 
 
 @inlined
-def _count_differing_among(  # type: ignore[no-untyped-def]
+def count_differing_among(  # type: ignore[no-untyped-def]
     left, right, left_masks, right_masks, fi, ui, fj, uj, row, differing, compared
 ):
     """How many bits differ among those that are set in the masks of both views, and how many these are."""
+    kind = np.uint8
     for x in range(np.uintp(differing.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
-        differ, among = np.uint16(0), np.uint16(0)
+        differ, among = kind(0), kind(0)
         for word in range(CENSUS_WORDS):
-            both = np.uint16(left_masks[fi, word, row, i] & right_masks[fj, word, row, j])
-            unlike = np.uint16((left[fi, word, row, i] ^ right[fj, word, row, j]) & both)
-            differ, among = np.uint16(differ + popcount(unlike)), np.uint16(among + popcount(both))
+            both = kind(left_masks[fi, word, row, i] & right_masks[fj, word, row, j])
+            unlike = kind((left[fi, word, row, i] ^ right[fj, word, row, j]) & both)
+            differ, among = kind(differ + popcount(unlike)), kind(among + popcount(both))
         differing[x], compared[x] = differ, among
 
 
@@ -134,19 +136,20 @@ def _mixed_difference(  # type: ignore[no-untyped-def]
     left, right, left_slope, right_slope, differing, compared, fi, ui, fj, uj, row, masked, channels, limit, out
 ):
     """out = the cost of ``mixed`` at every pixel, between 0 and 1 unless `limit` allows more."""
-    colour, slope = np.float32(COLOUR / COLOUR_SPAN / len(channels)), np.float32(SLOPE / SLOPE_SPAN)
-    order, steepest = np.float32(ORDER / ORDER_SPAN), np.float32(SLOPE_SPAN)
-    most, zero, bits = np.float32(ORDER_SPAN), np.float32(0), np.float32(CENSUS_BITS)
+    colour, slope = np.float32(COLOUR / COLOUR_SPAN / len(channels) / UNITS), np.float32(SLOPE / SLOPE_SPAN / UNITS)
+    order, steepest, kind = np.float32(ORDER / ORDER_SPAN), np.float32(SLOPE_SPAN * UNITS), np.uint16
+    most, bits, farthest = np.float32(ORDER_SPAN), np.float32(CENSUS_BITS), limit * np.float32(UNITS)
     for x in range(np.uintp(out.size)):
         i, j = x + np.uintp(ui), x + np.uintp(uj)
-        total = zero
+        total = kind(0)  # of three channels it is less than 65536: each has less than 320 levels
         for c in range(len(channels)):
-            total += abs(left[fi, c, row, i] - right[fj, c, row, j])
-        steep = abs(left_slope[fi, row, i] - right_slope[fj, row, j])
-        differ = np.float32(differing[x])
+            a, b = left[fi, c, row, i], right[fj, c, row, j]
+            total = kind(total + kind(max(a, b) - min(a, b)))
+        a, b = left_slope[fi, row, i], right_slope[fj, row, j]
+        steep, differ = np.float32(kind(max(a, b) - min(a, b))), np.float32(differing[x])
         if len(masked) > 0:
             differ = bits * differ / np.float32(compared[x])
-        out[x] = colour * min(total, limit) + slope * min(steep, steepest) + order * min(differ, most)
+        out[x] = colour * min(np.float32(total), farthest) + slope * min(steep, steepest) + order * min(differ, most)
 
 
 @helper
@@ -246,7 +249,7 @@ def pair_rows(left, right, criterion, spans, fineness, y0, p, out):  # type: ign
     ring = np.zeros((TILE, side, samples), np.float32)
     weights = np.empty((TILE, samples), np.float32)
     column = np.zeros(samples + 2 * reach, np.float32)
-    differing, compared = np.empty(samples, np.uint16), np.empty(samples, np.uint16)
+    differing, compared = np.empty(samples, np.uint8), np.empty(samples, np.uint8)
     zero = np.float32(0)
     for nearest in range(TILE, out.shape[2] + TILE, TILE):
         tile = range(nearest - TILE, min(nearest, out.shape[2]))
@@ -271,11 +274,11 @@ def pair_rows(left, right, criterion, spans, fineness, y0, p, out):  # type: ign
                 else:
                     differ, among = differing[:width], compared[:width]
                     if len(masked) > 0:
-                        _count_differing_among(
+                        count_differing_among(
                             left.bits, right.bits, left.masks, right.masks, fi, ui, fj, uj, row, differ, among
                         )
                     else:
-                        _count_differing(left.bits, right.bits, fi, ui, fj, uj, row, differ)
+                        count_differing(left.bits, right.bits, fi, ui, fj, uj, row, differ)
                     if measure == CENSUS:
                         _census_difference(differ, among, masked, cost)
                     else:

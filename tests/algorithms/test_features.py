@@ -18,7 +18,7 @@ from matbench.algorithms.features import same_surface
 def test_same_surface_is_what_is_near_or_of_a_colour(shape, fineness, most, seed):
     rows = np.random.default_rng(seed).integers(-3, 4, shape).astype(np.float32)
     bits = same_surface(rows, fineness, most)
-    assert bits.shape == (shape[0], 3, *shape[2:])
+    assert bits.shape == (shape[0], 6, *shape[2:])
     for view, y, x in np.ndindex(shape[0], *shape[2:]):
         like = np.delete(like_middle(rows[view], y, x, fineness, most).ravel(), 24)
-        assert "".join(f"{word:016b}" for word in bits[view, :, y, x]) == "".join(map(str, like.astype(int)))
+        assert "".join(f"{word:08b}" for word in bits[view, :, y, x]) == "".join(map(str, like.astype(int)))
