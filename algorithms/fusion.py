@@ -14,6 +14,7 @@ from matbench.algorithms.windows import Features
 # What is assumed of a point before any view or pair is asked. It weighs as half of one; a tenth of its rays end there.
 # Without it, one view alone would be as certain as all that agree, and a point that none sees would be 0 / 0.
 PRIOR, ENDED = 0.5, 0.05
+BLOCK = 128  # columns
 
 
 @helper
@@ -25,11 +26,39 @@ def _exchange(high, low):  # type: ignore[no-untyped-def]
 
 
 @helper
+def _copy(values, row):  # type: ignore[no-untyped-def]
+    for x in range(row.size):
+        row[x] = values[x]
+
+
+@helper
 def _sum_first(part, place, taken, total):  # type: ignore[no-untyped-def]
     """Adds the number of rank `place`, counted from 0, in the columns that take more than `place` numbers."""
-    zero = np.float32(0)
+    kind = np.uint16
     for x in range(total.size):
-        total[x] += np.float32(part[x]) if place < taken[x] else zero
+        value = kind(part[x])  # read in any case: else one column would be summed at a time
+        total[x] = kind(total[x] + (value if taken[x] > place else kind(0)))
+
+
+@helper
+def _from_sums(total, share, most, cost):  # type: ignore[no-untyped-def]
+    """cost = most - share total."""
+    for x in range(cost.size):
+        cost[x] = most[x] - share[x] * np.float32(total[x])
+
+
+@helper
+def _count_pairs(low, high, hidden, taken, share, most):  # type: ignore[no-untyped-def]
+    """How many similarities of a point count, the share of each in the cost, and the cost if all are 0."""
+    fill(np.uint16(0), taken)
+    for p in range(low.size):
+        for x in range(low[p], high[p]):
+            taken[x] += np.uint16(1)
+    for x in range(taken.size):
+        half = (taken[x] + 1) // 2
+        taken[x] = half
+        share[x] = np.float32(1 / FULL) / np.float32(max(half, 1))
+        most[x] = np.float32(1) if half > 0 else hidden
 
 
 @kernel
@@ -49,28 +78,21 @@ def better_half(rho, low, high, hidden, cost):  # type: ignore[no-untyped-def]
         (rows, planes, columns) float32 in [0, 1], overwritten.
     """
     count, columns = rho.shape[1], rho.shape[3]
-    best = np.empty((count, columns), np.uint8)
-    taken = np.empty(columns, np.int32)
-    scale, one = np.float32(1 / FULL), np.float32(1)
+    wide = (columns + BLOCK - 1) // BLOCK * BLOCK  # no columns are left over from loops that take several at a time
+    best = np.zeros((count, wide), np.uint8)
+    taken, total = np.zeros(wide, np.uint16), np.empty(wide, np.uint16)
+    share, most = np.empty(columns, np.float32), np.empty(columns, np.float32)
     for k in range(rho.shape[2]):
-        taken[:] = 0
-        for p in range(count):
-            for x in range(low[p, k], high[p, k]):
-                taken[x] += 1
-        for x in range(columns):
-            taken[x] = (taken[x] + 1) // 2
+        _count_pairs(low[:, k], high[:, k], hidden, taken[:columns], share, most)
         for y in range(rho.shape[0]):
             for p in range(count):
-                for x in range(columns):
-                    best[p, x] = rho[y, p, k, x]  # 0 beyond a frustum, and so sorted behind what counts
-            total = cost[y, k]
-            total[:] = 0
+                _copy(rho[y, p, k], best[p, :columns])  # 0 beyond a frustum, and so sorted behind what counts
+            fill(np.uint16(0), total)
             for place in range((count + 1) // 2):  # sorts no further than the sum needs
                 for p in range(count - 1, place, -1):
                     _exchange(best[p - 1], best[p])
-                _sum_first(best[place], place, taken, total)
-            for x in range(columns):
-                total[x] = one - total[x] * scale / np.float32(max(taken[x], 1)) if taken[x] > 0 else hidden
+                _sum_first(best[place], np.uint16(place), taken, total)
+            _from_sums(total[:columns], share, most, cost[y, k])
 
 
 @helper

@@ -20,17 +20,22 @@ def fill_from_background(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
     -------
     (H, W) float32 without NaN, unless all of `disparity` is NaN.
     """
-    rows, columns = disparity.shape
     known = ~np.isnan(disparity)
-    here = np.arange(columns)
-    left = np.maximum.accumulate(np.where(known, here, -1), axis=1)
-    right = np.minimum.accumulate(np.where(known, here, columns)[:, ::-1], axis=1)[:, ::-1]
+    torn = np.flatnonzero(~known.all(axis=1))
+    filled = disparity.copy()
+    if torn.size == 0:
+        return filled
+    here, columns = np.arange(disparity.shape[1]), disparity.shape[1]
+    left = np.maximum.accumulate(np.where(known[torn], here, -1), axis=1)
+    right = np.minimum.accumulate(np.where(known[torn], here, columns)[:, ::-1], axis=1)[:, ::-1]
     # one more column, which stands for "none" on either side: index -1 and index `columns`
-    padded = np.concatenate([disparity, np.full((rows, 1), np.inf, disparity.dtype)], axis=1)
-    filled = np.minimum(np.take_along_axis(padded, left, axis=1), np.take_along_axis(padded, right, axis=1))
+    padded = np.concatenate([disparity[torn], np.full((torn.size, 1), np.inf, disparity.dtype)], axis=1)
+    filled[torn] = np.minimum(np.take_along_axis(padded, left, axis=1), np.take_along_axis(padded, right, axis=1))
 
     answered = np.flatnonzero(known.any(axis=1))
     if answered.size == 0:
         return disparity.copy()
-    nearest = np.abs(np.arange(rows)[:, None] - answered).argmin(axis=1)
-    return np.asarray(filled[answered[nearest]], disparity.dtype)
+    empty = np.flatnonzero(~known.any(axis=1))
+    nearest = np.abs(empty[:, None] - answered).argmin(axis=1)
+    filled[empty] = filled[answered[nearest]]
+    return filled

@@ -46,11 +46,21 @@ def count_votes(maps, view, tolerance, top, end, agreeing, contradicting):  # ty
 
 
 @kernel
-def vote(found, image, doubtful, trusted, colour, distance, least, step, top, end, out):  # type: ignore[no-untyped-def]
+def classify(found, trusted, least, step):  # type: ignore[no-untyped-def]
+    """(H, W) int32 classes, `step` wide from `least` on, in which disparities lie; -1 where they are not trusted."""
+    places = np.empty(found.shape, np.int32)
+    for y in range(found.shape[0]):
+        for x in range(found.shape[1]):
+            places[y, x] = np.int32((found[y, x] - least) / step) if trusted[y, x] else -1
+    return places
+
+
+@kernel
+def vote(found, image, doubtful, places, colour, distance, least, step, top, end, out):  # type: ignore[no-untyped-def]
     """Weighted median of the trusted neighbours of every doubtful pixel.
 
     Neighbours weigh exp(-|dI| / COLOUR - (|dx| + |dy|) / DISTANCE), with |dI| the largest difference
-    over the colours. Votes are counted in classes `step` wide from `least` on, and the median is the middle of a
+    over the colours. Votes are counted in classes, and the median is the middle of a
     class, or the largest disparity found if that is less. A pixel within one step of the median, or
     without trusted neighbours, keeps its own disparity.
 
@@ -60,8 +70,10 @@ def vote(found, image, doubtful, trusted, colour, distance, least, step, top, en
         (H, W) float32 disparities, NaN = none.
     image
         (H, W, 3) uint8.
-    doubtful, trusted
-        (H, W) bool: the pixels to mend, and those that may vote.
+    doubtful
+        (H, W) bool: the pixels to mend.
+    places
+        Classes of the pixels that may vote (`classify`).
     colour, distance
         (256,) and (REACH + 1,) float32: the weight's factors, by |dI| and by |dx| or |dy|.
     least, step
@@ -71,6 +83,7 @@ def vote(found, image, doubtful, trusted, colour, distance, least, step, top, en
     """
     height, width = found.shape
     reach = distance.size - 1
+    near = np.concatenate((distance[:0:-1], distance))  # by column of the window
     most = np.nanmax(found)
     votes = np.empty(np.int64((most - least) / step) + 1, np.float32)
     for y in range(top, end):
@@ -80,14 +93,17 @@ def vote(found, image, doubtful, trusted, colour, distance, least, step, top, en
                 continue
             votes[:] = 0
             total = np.float32(0)
+            first, last = max(0, x - reach), min(width, x + reach + 1)
+            skipped = np.uintp(first - (x - reach))
+            red, green, blue = np.int64(image[y, x, 0]), np.int64(image[y, x, 1]), np.int64(image[y, x, 2])
             for v in range(max(0, y - reach), min(height, y + reach + 1)):
-                for u in range(max(0, x - reach), min(width, x + reach + 1)):
-                    if trusted[v, u]:
-                        gap = np.int64(0)
-                        for c in range(3):
-                            gap = max(gap, abs(np.int64(image[y, x, c]) - np.int64(image[v, u, c])))
-                        weight = colour[gap] * distance[abs(v - y)] * distance[abs(u - x)]
-                        votes[np.int64((found[v, u] - least) / step)] += weight
+                apart, classes, colours = distance[abs(v - y)], places[v, first:last], image[v, first:last]
+                for u in range(np.uintp(classes.size)):
+                    place = classes[u]
+                    if place >= 0:
+                        gap = max(abs(red - colours[u, 0]), abs(green - colours[u, 1]), abs(blue - colours[u, 2]))
+                        weight = colour[np.uintp(gap)] * apart * near[u + skipped]
+                        votes[np.uintp(place)] += weight
                         total += weight
             if total > 0:
                 place, passed = 0, votes[0]
@@ -141,10 +157,12 @@ def mend(
                 new[view] = maps[view]
                 continue
 
+            least, step = np.float32(np.nanmin(found)), np.float32(pixel / 2)
+            doubtful, places = ~trusted, classify(found, trusted, least, step)
+
             def ask(top: int, end: int, view: int = view) -> None:
                 vote(
-                    found, image, ~trusted, trusted, colour, distance,  # noqa: B023
-                    np.float32(np.nanmin(found)), np.float32(pixel / 2), top, end, new[view],  # noqa: B023
+                    found, image, doubtful, places, colour, distance, least, step, top, end, new[view],  # noqa: B023
                 )  # fmt: skip
 
             over_rows(ask, shape[0], threads)

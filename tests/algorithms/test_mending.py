@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from matbench.algorithms.holes import fill_from_background
-from matbench.algorithms.mending import COLOUR, DISTANCE, REACH, TRUST, count_votes, mend, vote
+from matbench.algorithms.mending import COLOUR, DISTANCE, REACH, TRUST, classify, count_votes, mend, vote
 
 SHAPES = st.tuples(st.integers(2, 6), st.integers(1, 5), st.integers(1, 12))
 
@@ -100,7 +100,8 @@ def test_vote_is_a_weighted_median(shape, step, share, seed):
     out = np.full(found.shape, 9, np.float32)
     for top, end in ((0, 1), (1, len(found))):
         least = np.float32(np.nanmin(found))
-        vote(found, images[0], asked, trusted, colour, distance, least, np.float32(step), top, end, out)
+        places = classify(found, trusted, least, np.float32(step))
+        vote(found, images[0], asked, places, colour, distance, least, np.float32(step), top, end, out)
     expected, even = voted(found, images[0], asked, trusted, step)
     np.testing.assert_allclose(out[~even], expected[~even], atol=1e-5)
 
