@@ -7,7 +7,8 @@ from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import fill, helper, kernel
-from matbench.algorithms.parallel import over_rows
+from matbench.algorithms.parallel import over_rows, share
+from matbench.algorithms.pixels import weigh_pixels
 from matbench.algorithms.similarity import FULL, Matcher
 from matbench.algorithms.windows import Features
 
@@ -15,6 +16,7 @@ from matbench.algorithms.windows import Features
 # Without it, one view alone would be as certain as all that agree, and a point that none sees would be 0 / 0.
 PRIOR, ENDED = 0.5, 0.05
 BLOCK = 128  # columns
+AT_ONCE = 16  # rows: their similarities stay in the cache until they are combined
 
 
 @helper
@@ -260,10 +262,13 @@ class Fusion:
         spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
         low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
 
-        def combine(rho: NDArray[np.uint8], _: int, cost: NDArray[np.float32]) -> None:
+        features = matcher.phases() if phases is None else phases
+
+        def combine(top: int, cost: NDArray[np.float32]) -> None:
+            rho = matcher.rays(features, top, top + len(cost), self._side)
             better_half(rho, low, high, np.float32(self.hidden), cost)
 
-        return self._cost(matcher, threads, phases, combine)
+        return self._cost(matcher, threads, combine)
 
     def seen_cost(
         self, matcher: Matcher, maps: NDArray[np.float32], threads: int = 1, phases: Features | None = None
@@ -291,25 +296,34 @@ class Fusion:
         spans = np.stack([matcher.ray_spans(view, j) for j in range(space.views)])
         material = np.empty((space.rows, space.planes, space.width), np.float32)
 
-        def combine(rho: NDArray[np.uint8], top: int, cost: NDArray[np.float32]) -> None:
-            part = material[top : top + len(cost)]
-            weigh_seen(rho, matcher.pairs, maps, view, spans, top, space.fineness, np.float32(self.hidden), cost, part)
+        features = matcher.phases() if phases is None else phases
+        side, hidden = self._side, np.float32(self.hidden)
 
-        return self._cost(matcher, threads, phases, combine), material
+        def pixels(top: int, cost: NDArray[np.float32]) -> None:
+            criterion, part = matcher.pixel_criterion(features), material[top : top + len(cost)]
+            prior, ended = np.float32(PRIOR), np.float32(ENDED)
+            weigh_pixels(features, maps, view, *criterion, spans, space.fineness, top, prior, ended, hidden, cost, part)
+
+        def windows(top: int, cost: NDArray[np.float32]) -> None:
+            rho, part = matcher.rays(features, top, top + len(cost), side), material[top : top + len(cost)]
+            weigh_seen(rho, matcher.pairs, maps, view, spans, top, space.fineness, hidden, cost, part)
+
+        alone = matcher.by_pixels(side) and matcher.settings.pairs == "reference"
+        return self._cost(matcher, threads, pixels if alone else windows), material
+
+    @property
+    def _side(self) -> int | None:
+        """Of the windows that are compared, if it is not that of the settings."""
+        return 1 if self.adaptive else None
 
     def _cost(
-        self,
-        matcher: Matcher,
-        threads: int,
-        phases: Features | None,
-        combine: Callable[[NDArray[np.uint8], int, NDArray[np.float32]], None],
+        self, matcher: Matcher, threads: int, combine: Callable[[int, NDArray[np.float32]], None]
     ) -> NDArray[np.float32]:
-        """Combine similarities block by block of rows, by ``combine(rho, first row, cost)``, and average the costs.
+        """Find costs some rows at a time, by ``combine(first row, cost)``, and average them.
 
         Similarities are not kept: of all rows they would take too much memory.
         """
         space, image = matcher.space, matcher.scene.views[matcher.scene.ref]
-        features = matcher.phases() if phases is None else phases
         radius = matcher.settings.window // 2 if self.adaptive else 0
         fall = np.exp(np.arange(256) / -(self.adaptive or np.inf)).astype(np.float32)
         cost = np.empty((space.rows, space.planes, space.width), np.float32)
@@ -317,9 +331,15 @@ class Fusion:
         def fill_rows(first: int, end: int) -> None:
             top, bottom = max(0, first - radius), min(space.rows, end + radius)
             part = np.empty((bottom - top, *cost.shape[1:]), np.float32) if radius else cost[first:end]
-            combine(matcher.rays(features, top, bottom, 1 if self.adaptive else None), top, part)
-            if radius:
-                support(part, image, first, first - top, fall, radius, cost[first:end])
+            ready = top
+            for begin in range(first, end, AT_ONCE):
+                stop = min(end, begin + AT_ONCE)
+                before, after = max(0, begin - radius), min(space.rows, stop + radius)
+                combine(ready, part[ready - top : after - top])
+                ready = after
+                if radius:
+                    around = part[before - top : after - top]
+                    support(around, image, begin, begin - before, fall, radius, cost[begin:stop])
 
-        over_rows(fill_rows, space.rows, threads)
+        over_rows(fill_rows, space.rows, threads, min(share(space.rows, threads), 4 * AT_ONCE))
         return cost

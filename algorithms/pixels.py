@@ -71,6 +71,25 @@ def _copy(values, out):  # type: ignore[no-untyped-def]
         out[x] = values[x]
 
 
+@inlined
+def _compare_span(  # type: ignore[no-untyped-def]
+    features, a, b, masked, channels, limit, fi, ui, fj, uj, row, differ, among, order, similar
+):
+    """Similarities of some columns, as many as `similar` has: a multiple of `PIXELS`."""
+    # no whole tuples are handed on: with more arrays the compiler gives up checking that they do not overlap
+    if len(masked) > 0:
+        count_differing_among(
+            features.bits[a], features.bits[b], features.masks[a], features.masks[b], fi, ui, fj, uj, row, differ, among
+        )
+    else:
+        count_differing(features.bits[a], features.bits[b], fi, ui, fj, uj, row, differ)
+    _order(differ, among, masked, order)
+    _similar(
+        features.rows[a], features.rows[b], features.slopes[a], features.slopes[b], order, fi, ui, fj, uj, row,
+        channels, limit, similar,
+    )  # fmt: skip
+
+
 @kernel
 def compare_pixels(features, pairs, masked, channels, limit, spans, y0, out):  # type: ignore[no-untyped-def]
     """Similarities of all pairs for the rows y0, y0 + 1, ... of `out` (rows, pairs, planes, columns), overwritten.
@@ -105,22 +124,107 @@ def compare_pixels(features, pairs, masked, channels, limit, spans, y0, out):  #
                         fill(zero, out[y, p, k])
                         continue
                     wide = (width + PIXELS - 1) // PIXELS * PIXELS
-                    differ, among = differing[:wide], compared[:wide]
-                    if len(masked) > 0:
-                        count_differing_among(
-                            features.bits[a], features.bits[b], features.masks[a], features.masks[b],
-                            fi, ui, fj, uj, row, differ, among,
-                        )  # fmt: skip
-                    else:
-                        count_differing(features.bits[a], features.bits[b], fi, ui, fj, uj, row, differ)
-                    _order(differ, among, masked, order[:wide])
-                    _similar(
-                        features.rows[a], features.rows[b], features.slopes[a], features.slopes[b], order,
-                        fi, ui, fj, uj, row, channels, limit, similar[:wide],
+                    _compare_span(
+                        features, a, b, masked, channels, limit, fi, ui, fj, uj, row, differing[:wide],
+                        compared[:wide], order[:wide], similar[:wide],
                     )  # fmt: skip
                     fill(zero, out[y, p, k, :low])
                     _copy(similar, out[y, p, k, low : low + width])
                     fill(zero, out[y, p, k, low + width :])
+
+
+@helper
+def _least(values, least):  # type: ignore[no-untyped-def]
+    """least = the smallest of every `PIXELS` values."""
+    for block in range(least.size):
+        here = values[block * PIXELS]
+        for x in range(block * PIXELS + 1, min(values.size, (block + 1) * PIXELS)):
+            here = min(here, values[x])
+        least[block] = here
+
+
+@helper
+def _see(found, k, similar, total, reached, ended):  # type: ignore[no-untyped-def]
+    """Adds a view's V (1 - rho), V and w at plane k, see `fusion.sight`, to the sums over the views."""
+    zero, one, two, plane, scale = np.float32(0), np.float32(1), np.float32(2), np.float32(k), np.float32(1 / FULL)
+    for x in range(found.size):
+        behind = plane - found[x]
+        through = min(max(behind + two, zero), one)
+        total[x] += through * (one - scale * np.float32(similar[x]))
+        reached[x] += through
+        ended[x] += max(one - abs(behind), zero)
+
+
+@helper
+def _share_out(total, reached, ended):  # type: ignore[no-untyped-def]
+    for x in range(total.size):
+        total[x] /= reached[x]
+        ended[x] /= reached[x]
+
+
+@kernel
+def weigh_pixels(  # type: ignore[no-untyped-def]
+    features, maps, view, masked, channels, limit, spans, fineness, y0, prior, ended_before, hidden, cost, material
+):
+    """What `fusion.weigh_seen` finds for pairs of the reference view, comparing only pixels that see a point.
+
+    Parameters
+    ----------
+    features, masked, channels, limit
+        As in `compare_pixels`.
+    maps, view, fineness, hidden, cost, material
+        As in `fusion.weigh_seen`.
+    spans
+        (views, planes, 6) as there; row `view` is not read.
+    prior, ended_before
+        What is assumed before any view is asked: `fusion.PRIOR` and `fusion.ENDED`.
+    """
+    views, _, width = maps.shape
+    samples = features.rows.shape[4]
+    differing, compared = np.zeros(samples, np.uint8), np.zeros(samples, np.uint8)
+    order, similar = np.zeros(samples, np.uint16), np.zeros(samples, np.uint8)
+    reached, least = np.empty(width, np.float32), np.empty((views, (width + PIXELS - 1) // PIXELS), np.float32)
+    for y in range(cost.shape[0]):
+        row = y0 + y
+        for j in range(views):
+            _least(maps[j, row], least[j])
+        for k in range(cost.shape[1]):
+            total, ended = cost[y, k], material[y, k]
+            fill(prior * hidden, total)
+            fill(prior, reached)
+            fill(ended_before, ended)
+            seen_from = np.float32(k + 2)  # where rays end nearer than that, V is not 0
+            for j in range(views):
+                low, count = spans[j, k, 0], spans[j, k, 1]
+                if j == view or count <= 0:
+                    continue
+                fi, ui, fj, uj = spans[j, k, 2], spans[j, k, 3], spans[j, k, 4], spans[j, k, 5]
+                # a map has one value a pixel: between two pixels the nearer one is asked
+                start = uj + (1 if 2 * fj > fineness else 0)
+                begin = 0
+                while begin < count:
+                    end = begin
+                    while end < count:
+                        first, last = (start + end) // PIXELS, (start + min(end + PIXELS, count) - 1) // PIXELS
+                        if min(least[j, first], least[j, last]) >= seen_from:
+                            break
+                        end += PIXELS
+                    if end > begin:
+                        wide, stop = end - begin, min(end, count)
+                        _compare_span(
+                            features, view, j, masked, channels, limit, fi, ui + begin, fj, uj + begin, row,
+                            differing[:wide], compared[:wide], order[:wide], similar[:wide],
+                        )  # fmt: skip
+                        _see(
+                            maps[j, row, start + begin : start + stop],
+                            k,
+                            similar,
+                            total[low + begin : low + stop],
+                            reached[low + begin : low + stop],
+                            ended[low + begin : low + stop],
+                        )
+                    begin = end + PIXELS
+            _share_out(total, reached, ended)
 
 
 def most_costly(channels: int, truncation: float) -> np.uint16:

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
-from matbench.algorithms.kernels import fill, helper, kernel
+from matbench.algorithms.kernels import fill, helper, kernel, literal
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.peak_ratio import peak_ratio
 
@@ -19,48 +19,39 @@ def _contrast(a, b):  # type: ignore[no-untyped-def]
     )
 
 
+@literal
+def _round(values, scale, out):  # type: ignore[no-untyped-def]
+    zero, half, kind = np.float32(0), np.float32(0.5), out.dtype.type
+    for x in range(values.size):
+        value = values[x]
+        out[x] = kind(value * scale + half) if value == value else kind(zero)
+
+
 @kernel
 def _whole(cost, scale, out):  # type: ignore[no-untyped-def]
     """out = cost in whole units; 0 where it is unknown (NaN)."""
-    zero, half, kind = np.float32(0), np.float32(0.5), out.dtype.type
+    columns = cost.shape[2]
     for y in range(cost.shape[0]):
         for k in range(cost.shape[1]):
-            values, row = cost[y, k], out[y, k]
-            for x in range(values.size):
-                row[x] = kind(values[x] * scale + half) if values[x] == values[x] else kind(zero)
+            _round(cost[y, k], scale, out[y, k, :columns])
+            fill(out.dtype.type(0), out[y, k, columns:])
 
 
 @helper
-def _step_up(above, small, move):  # type: ignore[no-untyped-def]
-    """move = L(q, k + 1) + P1: before the first plane there is none."""
-    kind = move.dtype.type
-    for x in range(move.size):
-        move[x] = kind(above[x] + small)
+def _extend(below, above, before, small, cap, floor, cost, path):  # type: ignore[no-untyped-def]
+    """L(p, k) = C(p, k) + min(L(q, k +- 1) + P1, L(q, k), min L(q) + P2) - min L(q)."""
+    kind = path.dtype.type
+    for x in range(path.size):
+        move = kind(min(below[x], above[x]) + small)
+        path[x] = kind(kind(min(move, min(before[x], cap[x])) - floor[x]) + cost[x])
 
 
 @helper
-def _step(below, above, small, move):  # type: ignore[no-untyped-def]
-    """move = min L(q, k +- 1) + P1."""
-    kind = move.dtype.type
-    for x in range(move.size):
-        move[x] = kind(min(below[x], above[x]) + small)
-
-
-@helper
-def _extend(before, cap, floor, cost, move):  # type: ignore[no-untyped-def]
-    """move = C(p, k) + min(move, L(q, k), min L(q) + P2) - min L(q)."""
-    kind = move.dtype.type
-    for x in range(move.size):
-        move[x] = kind(kind(min(move[x], min(before[x], cap[x])) - floor[x]) + cost[x])
-
-
-@helper
-def _take(move, path, least, total):  # type: ignore[no-untyped-def]
-    """L(p, k) = move, and what it does to min L(p) and to the sum over the paths."""
-    kind = move.dtype.type
-    for x in range(move.size):
-        value = move[x]
-        path[x] = value
+def _take(path, least, total):  # type: ignore[no-untyped-def]
+    """What L(p, k) does to min L(p) and to the sum over the paths."""
+    kind = path.dtype.type
+    for x in range(path.size):
+        value = path[x]
         least[x] = min(least[x], value)
         total[x] = kind(total[x] + value)
 
@@ -80,14 +71,15 @@ def _sweep(cost, image, small, large, border, spread, forward, total):  # type: 
     border
         More than any L, and so much that `small` more is still a number of their kind.
     """
-    # many short loops over the columns, each over few arrays: so each becomes instructions for many columns at once
+    # short loops over the columns, each over few arrays: so each becomes instructions for many columns at once
     (rows, columns, _), planes = image.shape, cost.shape[1]
     count, kind = 2 * spread + 1, cost.dtype.type
     # L of the row before and of this one, and min L: a column more on both sides, from where a path begins anew
-    paths = np.zeros((count, 2, planes + 1, columns + 2), cost.dtype)
-    paths[:, :, planes] = border
+    paths = np.zeros((count, 2, planes + 2, columns + 2), cost.dtype)
+    paths[:, :, 0] = border  # before the first plane there is none, nor after the last
+    paths[:, :, planes + 1] = border
     least = np.zeros((count, 2, columns + 2), cost.dtype)
-    cap, move = np.zeros((count, columns), cost.dtype), np.empty(columns, cost.dtype)
+    cap = np.zeros((count, columns), cost.dtype)
     for row in range(rows):
         y, y_old = (row, row - 1) if forward else (rows - 1 - row, rows - row)
         old, new = row % 2, 1 - row % 2
@@ -103,12 +95,12 @@ def _sweep(cost, image, small, large, border, spread, forward, total):  # type: 
             for d in range(count):
                 first = 1 + spread - d
                 end, before = first + columns, paths[d, old]
-                if k == 0:
-                    _step_up(before[k + 1, first:end], small, move)
-                else:
-                    _step(before[k - 1, first:end], before[k + 1, first:end], small, move)
-                _extend(before[k, first:end], cap[d], least[d, old, first:end], cost[y, k, :columns], move)
-                _take(move, paths[d, new, k, 1:-1], least[d, new, 1:-1], total[y, k, :columns])
+                path = paths[d, new, k + 1, 1 : 1 + columns]
+                _extend(
+                    before[k, first:end], before[k + 2, first:end], before[k + 1, first:end], small, cap[d],
+                    least[d, old, first:end], cost[y, k, :columns], path,
+                )  # fmt: skip
+                _take(path, least[d, new, 1 : 1 + columns], total[y, k, :columns])
 
 
 _EACH, _BAND = 4, 128  # numbers in a word; rows that are turned together, so that lines of the cache are filled
@@ -183,14 +175,15 @@ def _add_paths(
     threads: int,
 ) -> None:
     """Adds the paths forward and backward to `total`, each by a thread of its own if there are two."""
-    ways = {True: total, False: np.zeros_like(total)}
+    ways = {True: total, False: total if threads <= 1 else np.zeros_like(total)}
 
     def sweep(first: int, _: int) -> None:
         forward = first == 0
         _sweep(cost, image, *steps, spread, forward, ways[forward])
 
     over_rows(sweep, 2, threads, 1)
-    total += ways[False]
+    if threads > 1:
+        total += ways[False]
 
 
 def aggregate(
@@ -223,7 +216,8 @@ def aggregate(
     border = np.iinfo(kind).max >> 1
     steps = kind(round(small * unit)), np.rint(table.astype(float) * unit).astype(kind), kind(border)
     rows, planes, columns = cost.shape
-    whole = np.zeros((-(-rows // _EACH) * _EACH, planes, -(-columns // _EACH) * _EACH), kind)
+    whole = np.empty((-(-rows // _EACH) * _EACH, planes, -(-columns // _EACH) * _EACH), kind)
+    whole[rows:] = 0
     over_rows(lambda top, end: _whole(cost[top:end], np.float32(unit), whole[top:end]), rows, threads)
     along = np.zeros(whole.shape[::-1], kind)
     _add_paths(_turned(whole, threads), np.ascontiguousarray(image.transpose(1, 0, 2)), steps, 0, along, threads)

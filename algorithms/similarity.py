@@ -266,16 +266,24 @@ class Matcher:
         window
             Side of the window in pixels, if it is not that of the settings.
         """
-        space, settings = self.space, self.settings
+        space = self.space
         shape = end - first, len(self.pairs), space.planes, space.width
-        if settings.similarity == "mixed" and (settings.window if window is None else window) == 1:
-            out, channels = np.empty(shape, np.uint8), (0,) * phases.rows.shape[2]
-            limit, masked = most_costly(len(channels), settings.truncation), (0,) * bool(phases.masks.size)
-            compare_pixels(phases, self.pairs, masked, channels, limit, self._stacked_ray_spans, first, out)
+        if self.by_pixels(window):
+            out = np.empty(shape, np.uint8)
+            compare_pixels(phases, self.pairs, *self.pixel_criterion(phases), self._stacked_ray_spans, first, out)
         else:
             out = np.zeros(shape, np.uint8)
             self._compare(phases, first, out, on_rays=True, window=window)
         return out
+
+    def by_pixels(self, window: int | None = None) -> bool:
+        """Are single pixels compared, with a window of that side or that of the settings, in whole numbers?"""
+        return self.settings.similarity == "mixed" and (self.settings.window if window is None else window) == 1
+
+    def pixel_criterion(self, phases: Features) -> tuple[tuple[int, ...], tuple[int, ...], np.uint16]:
+        """What `compare_pixels` takes besides the features: is the census masked, the channels, and the limit."""
+        channels = phases.rows.shape[2]
+        return (0,) * bool(phases.masks.size), (0,) * channels, most_costly(channels, self.settings.truncation)
 
     def all(self, threads: int = 1) -> NDArray[np.uint8]:
         """(rows, pairs, planes, columns) similarities of all rows in 255ths, as `block` gives them."""
