@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from matbench.algorithms.kernels import fill, helper, kernel
 from matbench.algorithms.parallel import over_rows, share
 from matbench.algorithms.pixels import weigh_pixels
+from matbench.algorithms.room import Room
 from matbench.algorithms.similarity import FULL, Matcher
 from matbench.algorithms.windows import Features
 
@@ -170,6 +171,17 @@ def weigh_seen(rho, pairs, maps, view, spans, y0, fineness, hidden, cost, materi
                 material[y, k, x] = ended[x] / reached[x]
 
 
+@kernel
+def charge(material, weight, cost):  # type: ignore[no-untyped-def]
+    """cost += weight (1 - material), in (rows, planes, columns)."""
+    one = np.float32(1)
+    for y in range(cost.shape[0]):
+        for k in range(cost.shape[1]):
+            paid, here = cost[y, k], material[y, k]
+            for x in range(paid.size):
+                paid[x] += weight * (one - here[x])
+
+
 @helper
 def _shares(image, y, radius, fall, share):  # type: ignore[no-untyped-def]
     """share (window rows, window columns, W) = fall[largest difference over the colours] of the pixels around each.
@@ -257,8 +269,13 @@ class Fusion:
     adaptive: float = field(default=10.0, validator=validators.ge(0))
     hidden: float = field(default=0.72, validator=validators.ge(0))
 
-    def first_cost(self, matcher: Matcher, threads: int = 1, phases: Features | None = None) -> NDArray[np.float32]:
-        """(H, planes, W) 1 - mean of the better half of rho on the reference view's pixel rays."""
+    def first_cost(
+        self, matcher: Matcher, threads: int = 1, phases: Features | None = None, room: Room | None = None
+    ) -> NDArray[np.float32]:
+        """(H, planes, W) 1 - mean of the better half of rho on the reference view's pixel rays.
+
+        It is taken from the `room`, if there is one: the next from there overwrites it.
+        """
         spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
         low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
 
@@ -268,10 +285,15 @@ class Fusion:
             rho = matcher.rays(features, top, top + len(cost), self._side)
             better_half(rho, low, high, np.float32(self.hidden), cost)
 
-        return self._cost(matcher, threads, combine)
+        return self._cost(matcher, threads, combine, room or Room())
 
     def seen_cost(
-        self, matcher: Matcher, maps: NDArray[np.float32], threads: int = 1, phases: Features | None = None
+        self,
+        matcher: Matcher,
+        maps: NDArray[np.float32],
+        threads: int = 1,
+        phases: Features | None = None,
+        room: Room | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Cost on the reference view's rays from the views that see each point, and the point's materiality.
 
@@ -290,11 +312,12 @@ class Fusion:
 
         Returns
         -------
-        Two (H, planes, W) float32 arrays: the cost and mu.
+        Two (H, planes, W) float32 arrays: the cost and mu. They are taken from the `room`, as those of `first_cost`.
         """
         space, view = matcher.space, matcher.scene.ref
         spans = np.stack([matcher.ray_spans(view, j) for j in range(space.views)])
-        material = np.empty((space.rows, space.planes, space.width), np.float32)
+        room = room or Room()
+        material = room.empty("material", (space.rows, space.planes, space.width), np.float32)
 
         features = matcher.phases() if phases is None else phases
         side, hidden = self._side, np.float32(self.hidden)
@@ -309,7 +332,7 @@ class Fusion:
             weigh_seen(rho, matcher.pairs, maps, view, spans, top, space.fineness, hidden, cost, part)
 
         alone = matcher.by_pixels(side) and matcher.settings.pairs == "reference"
-        return self._cost(matcher, threads, pixels if alone else windows), material
+        return self._cost(matcher, threads, pixels if alone else windows, room), material
 
     @property
     def _side(self) -> int | None:
@@ -317,7 +340,7 @@ class Fusion:
         return 1 if self.adaptive else None
 
     def _cost(
-        self, matcher: Matcher, threads: int, combine: Callable[[int, NDArray[np.float32]], None]
+        self, matcher: Matcher, threads: int, combine: Callable[[int, NDArray[np.float32]], None], room: Room
     ) -> NDArray[np.float32]:
         """Find costs some rows at a time, by ``combine(first row, cost)``, and average them.
 
@@ -326,7 +349,7 @@ class Fusion:
         space, image = matcher.space, matcher.scene.views[matcher.scene.ref]
         radius = matcher.settings.window // 2 if self.adaptive else 0
         fall = np.exp(np.arange(256) / -(self.adaptive or np.inf)).astype(np.float32)
-        cost = np.empty((space.rows, space.planes, space.width), np.float32)
+        cost: NDArray[np.float32] = room.empty("cost", (space.rows, space.planes, space.width), np.float32)
 
         def fill_rows(first: int, end: int) -> None:
             top, bottom = max(0, first - radius), min(space.rows, end + radius)

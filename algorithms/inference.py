@@ -7,9 +7,10 @@ from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
 from matbench.algorithms.agreement import agreement
-from matbench.algorithms.fusion import Fusion
+from matbench.algorithms.fusion import Fusion, charge
 from matbench.algorithms.mending import mend
 from matbench.algorithms.parallel import over_rows
+from matbench.algorithms.room import Room
 from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import Matcher, Matching
 from matbench.algorithms.surfaces import smoothed
@@ -63,8 +64,8 @@ class Inference:
             their sums of path costs, 0 where mending has moved the answer by more than a pixel of the pair.
         """
 
-        def cost(one: Matcher, phases: Features) -> NDArray[np.float32]:
-            return self.fusion.first_cost(one, threads, phases)
+        def cost(one: Matcher, phases: Features, room: Room) -> NDArray[np.float32]:
+            return self.fusion.first_cost(one, threads, phases, room)
 
         maps, sure, _ = self._maps(matcher, cost, threads, ratios)
         return self._on_surfaces(matcher, maps, sure, threads) if self.surfaces else maps
@@ -90,14 +91,13 @@ class Inference:
         and of the new maps before they are mended.
         """
 
-        def cost(one: Matcher, phases: Features) -> NDArray[np.float32]:
+        def cost(one: Matcher, phases: Features, room: Room) -> NDArray[np.float32]:
             if visibility:
-                least, mu = self.fusion.seen_cost(one, maps, threads, phases)
+                least, mu = self.fusion.seen_cost(one, maps, threads, phases, room)
             else:
-                least, mu = self.fusion.first_cost(one, threads, phases), agreement(one, maps, threads)
-            np.subtract(1, mu, out=mu)
-            mu *= np.float32(material)
-            return np.add(least, mu, out=least)
+                least, mu = self.fusion.first_cost(one, threads, phases, room), agreement(one, maps, threads)
+            over_rows(lambda top, end: charge(mu[top:end], np.float32(material), least[top:end]), len(mu), threads)
+            return least
 
         found, sure, energies = self._maps(matcher, cost, threads, ratios, maps)
         if self.surfaces:
@@ -108,7 +108,7 @@ class Inference:
     def _maps(
         self,
         matcher: Matcher,
-        cost: Callable[[Matcher, Features], NDArray[np.float32]],
+        cost: Callable[[Matcher, Features, Room], NDArray[np.float32]],
         threads: int,
         ratios: NDArray[np.float32] | None,
         known: NDArray[np.float32] | None = None,
@@ -118,14 +118,14 @@ class Inference:
         How sure a view is of its answers is known where it is asked: (views, H, W), or none. The reference view's are
         `ratios`, if there are any (`initial_maps`).
         """
-        space, scene, phases = matcher.space, matcher.scene, matcher.phases()
+        space, scene, phases, room = matcher.space, matcher.scene, matcher.phases(), Room()
         maps = np.empty((space.views, space.rows, space.width), np.float32)
         sure = np.empty_like(maps) if self.surfaces else maps[:0]
         energies = np.zeros((space.views, 2))
         for view, image in enumerate(scene.views):
-            paid = cost(matcher.with_reference(view), phases)
+            paid = cost(matcher.with_reference(view), phases, room)
             asked = self.surfaces or (ratios is not None and view == scene.ref)
-            maps[view], found = self.semiglobal.infer_surely(paid, image, threads, asked)
+            maps[view], found = self.semiglobal.infer_surely(paid, image, threads, asked, room)
             if found is not None and ratios is not None and view == scene.ref:
                 ratios[:] = found
             if found is not None and self.surfaces:

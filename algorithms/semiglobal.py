@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from matbench.algorithms.kernels import fill, helper, kernel, literal
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.peak_ratio import peak_ratio
+from matbench.algorithms.room import Room
 
 
 @helper
@@ -56,11 +57,20 @@ def _take(path, least, total):  # type: ignore[no-untyped-def]
         total[x] = kind(total[x] + value)
 
 
+@helper
+def _put(path, least, total):  # type: ignore[no-untyped-def]
+    """The same for the first of the paths: `total` is overwritten."""
+    for x in range(path.size):
+        value = path[x]
+        least[x] = min(least[x], value)
+        total[x] = value
+
+
 @kernel
-def _sweep(cost, image, small, large, border, spread, forward, total):  # type: ignore[no-untyped-def]
+def _sweep(cost, image, small, large, border, spread, forward, fresh, total):  # type: ignore[no-untyped-def]
     """The paths from the row before to the next one, added to `total`: down the columns and, for `spread` = 1, aslant.
 
-    Backward, the rows are walked from the last to the first.
+    Backward, the rows are walked from the last to the first; `fresh` sums overwrite `total`.
 
     L(p, k) = C(p, k) + min(L(q, k), L(q, k +- 1) + P1, min L(q) + P2) - min L(q), in whole units.
 
@@ -100,7 +110,10 @@ def _sweep(cost, image, small, large, border, spread, forward, total):  # type: 
                     before[k, first:end], before[k + 2, first:end], before[k + 1, first:end], small, cap[d],
                     least[d, old, first:end], cost[y, k, :columns], path,
                 )  # fmt: skip
-                _take(path, least[d, new, 1 : 1 + columns], total[y, k, :columns])
+                if fresh and d == 0:
+                    _put(path, least[d, new, 1 : 1 + columns], total[y, k, :columns])
+                else:
+                    _take(path, least[d, new, 1 : 1 + columns], total[y, k, :columns])
 
 
 _EACH, _BAND = 4, 128  # numbers in a word; rows that are turned together, so that lines of the cache are filled
@@ -155,15 +168,13 @@ def _units(top: float, table: NDArray[np.float32]) -> tuple[type[np.uint16 | np.
     return np.uint32, min(large, (1 << 23) / top) if top else large
 
 
-def _turned(volume: NDArray[Any], threads: int) -> NDArray[Any]:
-    """(columns, planes, rows) the same volume of the turned picture; rows and columns are multiples of four."""
-    out = np.empty(volume.shape[::-1], volume.dtype)
+def _turn_volume(volume: NDArray[Any], out: NDArray[Any], threads: int) -> None:
+    """out = (columns, planes, rows) the same volume of the turned picture; rows and columns are multiples of four."""
     if volume.itemsize == 2:
         words, turned = volume.view(np.uint64), out.view(np.uint64)
         over_rows(lambda first, end: _turn(words, first, end, turned), volume.shape[1], threads)
     else:
         np.copyto(out, volume.T)
-    return out
 
 
 def _add_paths(
@@ -172,22 +183,39 @@ def _add_paths(
     steps: tuple[Any, Any, Any],
     spread: int,
     total: NDArray[Any],
+    fresh: bool,
+    room: Room,
     threads: int,
 ) -> None:
-    """Adds the paths forward and backward to `total`, each by a thread of its own if there are two."""
-    ways = {True: total, False: total if threads <= 1 else np.zeros_like(total)}
+    """Adds the paths forward and backward to `total`, each by a thread of its own if there are two.
+
+    With `fresh` what stood there is overwritten.
+    """
+    if threads <= 1:
+        _sweep(cost, image, *steps, spread, True, fresh, total)
+        _sweep(cost, image, *steps, spread, False, False, total)
+        return
+    back = room.empty("back", total.shape, total.dtype)
 
     def sweep(first: int, _: int) -> None:
-        forward = first == 0
-        _sweep(cost, image, *steps, spread, forward, ways[forward])
+        _sweep(cost, image, *steps, spread, first == 0, fresh or first == 1, (total, back)[first])
+
+    def add(top: int, end: int) -> None:
+        np.add(total[top:end], back[top:end], out=total[top:end])
 
     over_rows(sweep, 2, threads, 1)
-    if threads > 1:
-        total += ways[False]
+    over_rows(add, len(total), threads)
 
 
 def aggregate(
-    cost: NDArray[np.float32], image: NDArray[np.uint8], small: float, large: float, edge: float, threads: int = 1
+    cost: NDArray[np.float32],
+    image: NDArray[np.uint8],
+    small: float,
+    large: float,
+    edge: float,
+    threads: int = 1,
+    room: Room | None = None,
+    largest: float | None = None,
 ) -> tuple[NDArray[np.uint16] | NDArray[np.uint32], float]:
     """Sum of the path costs over eight directions, in whole units: many small numbers are added at once.
 
@@ -203,37 +231,62 @@ def aggregate(
         P1 for a step of one plane, P2 for any larger one, in units of the cost.
     edge
         Grey levels of contrast over which P2 falls to 1/e; it never falls below P1.
+    room
+        Where the arrays are taken from, the sums among them: the next sums from there overwrite these.
+    largest
+        The largest cost, if it is known.
 
     Returns
     -------
     sums
-        (H, planes, W or up to three more) whole numbers. The same for any number of threads.
+        (H, planes, W or up to three more) whole numbers, and anything in columns beyond W. The same for any number
+        of threads.
     unit
         How many of them make a cost of 1: 4095 for costs up to 1 and a P2 of 1.
     """
     table = penalties(small, large, edge)
-    kind, unit = _units(float(np.nanmax(cost, initial=0)), table)
+    kind, unit = _units(float(np.nanmax(cost, initial=0)) if largest is None else largest, table)
     border = np.iinfo(kind).max >> 1
     steps = kind(round(small * unit)), np.rint(table.astype(float) * unit).astype(kind), kind(border)
     rows, planes, columns = cost.shape
-    whole = np.empty((-(-rows // _EACH) * _EACH, planes, -(-columns // _EACH) * _EACH), kind)
-    whole[rows:] = 0
+    room = room or Room()
+    shape = -(-rows // _EACH) * _EACH, planes, -(-columns // _EACH) * _EACH
+    whole, total = room.empty("whole", shape, kind), room.empty("total", shape, kind)
     over_rows(lambda top, end: _whole(cost[top:end], np.float32(unit), whole[top:end]), rows, threads)
-    along = np.zeros(whole.shape[::-1], kind)
-    _add_paths(_turned(whole, threads), np.ascontiguousarray(image.transpose(1, 0, 2)), steps, 0, along, threads)
-    total = _turned(along, threads)
-    del along
-    _add_paths(whole, image, steps, 1, total, threads)
+    turned, along = room.empty("turned", shape[::-1], kind), room.empty("along", shape[::-1], kind)
+    _turn_volume(whole, turned, threads)
+    turned_image = np.ascontiguousarray(image.transpose(1, 0, 2))
+    _add_paths(turned, turned_image, steps, 0, along, True, room, threads)
+    _turn_volume(along, total, threads)
+    _add_paths(whole, image, steps, 1, total, False, room, threads)
     return total[:rows], unit
 
 
 @helper
-def _lesser(values, known, k, least, best):  # type: ignore[no-untyped-def]
+def _lesser_known(values, known, k, least, best):  # type: ignore[no-untyped-def]
+    # all is read before anything is decided, here and below: else one column would be taken at a time
+    plane = np.float32(k)
     for x in range(known.size):
-        value = np.float32(values[x])
-        better = known[x] == known[x] and value < least[x]
-        best[x] = np.float32(k) if better else best[x]
-        least[x] = value if better else least[x]
+        value, cost, before, place = np.float32(values[x]), known[x], least[x], best[x]
+        better = cost == cost and value < before
+        best[x] = plane if better else place
+        least[x] = value if better else before
+
+
+@helper
+def _lesser(values, k, least, best):  # type: ignore[no-untyped-def]
+    plane = least.dtype.type(k)
+    for x in range(least.size):
+        value, before, place = values[x], least[x], best[x]
+        best[x] = plane if value < before else place
+        least[x] = min(value, before)
+
+
+@helper
+def _fraction(below, here, above):  # type: ignore[no-untyped-def]
+    """Of a plane, by the equiangular fit; 0 where `here` is not the least, or all are the same."""
+    drop = max(below, above) - here
+    return (below - above) / (drop + drop) if drop > 0 and here <= min(below, above) else np.float32(0)
 
 
 @kernel
@@ -252,17 +305,33 @@ def winner(total, cost):  # type: ignore[no-untyped-def]
         fill(np.float32(np.nan), answers)
         fill(np.float32(np.inf), least)
         for k in range(planes):
-            _lesser(sums[k], known[k], k, least, answers)
+            _lesser_known(sums[k], known[k], k, least, answers)
         for x in range(width):
             if not 0 < answers[x] < planes - 1:
                 continue
             best = int(answers[x])
             if not np.isnan(known[best - 1, x]) and not np.isnan(known[best + 1, x]):
-                below, above = np.float32(sums[best - 1, x]), np.float32(sums[best + 1, x])
-                drop = max(below, above) - least[x]
-                if drop > 0 and least[x] <= min(below, above):
-                    answers[x] += (below - above) / (drop + drop)
+                answers[x] += _fraction(np.float32(sums[best - 1, x]), least[x], np.float32(sums[best + 1, x]))
     return found
+
+
+@kernel
+def winner_of_known(total, found):  # type: ignore[no-untyped-def]
+    """The same where all costs are known: found (H, W) float32, overwritten, from whole numbers (H, planes, W)."""
+    planes, width = total.shape[1], found.shape[1]
+    best, least = np.empty(width, total.dtype), np.empty(width, total.dtype)
+    for y in range(found.shape[0]):
+        sums = total[y]
+        fill(total.dtype.type(0), best)
+        for x in range(width):
+            least[x] = sums[0, x]
+        for k in range(1, planes):
+            _lesser(sums[k], k, least, best)
+        for x in range(width):
+            k = np.int64(best[x])
+            found[y, x] = np.float32(k)
+            if 0 < k < planes - 1:
+                found[y, x] += _fraction(np.float32(sums[k - 1, x]), np.float32(least[x]), np.float32(sums[k + 1, x]))
 
 
 @kernel
@@ -324,11 +393,27 @@ class SemiGlobal:
         return self.infer_surely(cost, image, threads, surely=False)[0]
 
     def infer_surely(
-        self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1, surely: bool = True
+        self,
+        cost: NDArray[np.float32],
+        image: NDArray[np.uint8],
+        threads: int = 1,
+        surely: bool = True,
+        room: Room | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """The same, and (H, W) the `peak_ratio` of the sums of path costs, if it is asked for."""
-        sums, _ = aggregate(cost, image, self.small_step, self.large_step, self.contrast, threads)
-        found = np.asarray(winner(sums, cost))
+        largest = float(np.max(cost, initial=0))
+        complete = not np.isnan(largest)
+        steps = self.small_step, self.large_step, self.contrast
+        sums, _ = aggregate(cost, image, *steps, threads, room, largest if complete else None)
+        found = np.empty(image.shape[:2], np.float32)
+
+        def win(top: int, end: int) -> None:
+            if complete:
+                winner_of_known(sums[top:end], found[top:end])
+            else:
+                found[top:end] = winner(sums[top:end], cost[top:end])
+
+        over_rows(win, len(found), threads, 64)
         return found, peak_ratio(sums, found, threads) if surely else None
 
     def energy(self, cost: NDArray[np.float32], image: NDArray[np.uint8], planes: NDArray[np.float32]) -> float:

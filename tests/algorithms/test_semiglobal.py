@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from matbench.algorithms.semiglobal import SemiGlobal, aggregate, penalties, winner
+from matbench.algorithms.semiglobal import SemiGlobal, aggregate, penalties, winner, winner_of_known
 
 DIRECTIONS = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
 
@@ -68,6 +68,10 @@ def test_aggregation_and_winner_are_their_twins(problem, steps, scale):
     total = total[..., : cost.shape[2]]
     np.testing.assert_array_equal(total, twin(whole, image, round(steps[0] * unit), table))
     np.testing.assert_allclose(winner(total.copy(), cost), twin_winner(total, cost), atol=1e-3)
+    if not np.isnan(cost).any():
+        found = np.empty(cost.shape[::2], np.float32)
+        winner_of_known(total, found)
+        np.testing.assert_array_equal(found, winner(total.copy(), cost))
     # the least of other totals may lie beside a lesser one that is unknown
     other = np.roll(total, 1, axis=1)
     np.testing.assert_allclose(winner(other, cost), twin_winner(other, cost), atol=1e-3)
@@ -117,7 +121,7 @@ def test_threads_change_nothing():
     rng = np.random.default_rng(0)
     cost, image = rng.random((20, 9, 30), np.float32), rng.integers(0, 256, (20, 30, 3), dtype=np.uint8)
     one, two = (aggregate(cost, image, 0.5, 3.0, 25.0, threads)[0] for threads in (1, 2))
-    np.testing.assert_array_equal(one, two)
+    np.testing.assert_array_equal(one[..., :30], two[..., :30])
 
 
 def test_unknown_pixels_answer_nothing_and_pass_messages_on():
