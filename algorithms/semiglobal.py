@@ -328,10 +328,11 @@ def winner_of_known(total, found):  # type: ignore[no-untyped-def]
         for k in range(1, planes):
             _lesser(sums[k], k, least, best)
         for x in range(width):
-            k = np.int64(best[x])
-            found[y, x] = np.float32(k)
-            if 0 < k < planes - 1:
-                found[y, x] += _fraction(np.float32(sums[k - 1, x]), np.float32(least[x]), np.float32(sums[k + 1, x]))
+            won = int(best[x])
+            found[y, x] = np.float32(won)
+            if 0 < won < planes - 1:
+                below, above = np.float32(sums[won - 1, x]), np.float32(sums[won + 1, x])
+                found[y, x] += _fraction(below, np.float32(least[x]), above)
 
 
 @kernel
