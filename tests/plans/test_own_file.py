@@ -114,6 +114,7 @@ def test_kernels_follow_the_kernels_that_they_call(tmp_path: Path, monkeypatch: 
     from numba import config
 
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "kernels"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))  # numba reads it again where it has changed
     text = MINE.format(name="One").replace("helper.VALUE + more()", "outer(1.0)")
     outer = "from numba import njit\n\n@njit(cache=True)\ndef outer(x):\n    return inner(x)\n\nclass"
     mine = put(tmp_path / "one", "One", 1)

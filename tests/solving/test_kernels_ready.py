@@ -37,6 +37,7 @@ def imported(path: Path) -> ModuleType:
 def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "kernels").mkdir()
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "kernels"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))  # numba reads it again where it has changed
     (tmp_path / "made_ready.py").write_text(TEXT)
     return tmp_path / "made_ready.py"
 
