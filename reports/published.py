@@ -167,7 +167,8 @@ def check(scenes: Iterable[str], metric: str = tables.METRIC) -> None:
         raise UserError(f"published rows are known by {', '.join(known)} only, not by {metric}")
     why = [refusal(scene) for scene in scenes]
     if why and None not in why:
-        more = f" ({len(why) - 1} more scenes have none)" if len(why) > 1 else ""
+        left = len(why) - 1
+        more = f" ({left} more {'scene has' if left == 1 else 'scenes have'} none)" if left else ""
         raise UserError(f"no published rows to show: {why[0]}{more}")
 
 

@@ -134,7 +134,7 @@ def test_pictures_of_another_size_are_no_part_of_it() -> None:
     ("scenes", "metric", "said"),
     [
         (["synthetic/box"], "total_bad_1", "no published rows to show: synthetic/box"),
-        (["middlebury2003/teddy", "synthetic/box"], "total_bad_1", "1 more scenes have none"),
+        (["middlebury2003/teddy", "synthetic/box"], "total_bad_1", "1 more scene has none"),
         ([PAIR], "bad_2", "known by total_bad_1 only, not by bad_2"),
     ],
 )
