@@ -31,10 +31,13 @@ class Ranges:
         """The ranges of (views, q, 3, H, W) samples, see `by_phase`."""
         least, largest = phases.copy(), phases.copy()
         for axis in (3, 4):
-            before, after = (np.take(phases, range(one, phases.shape[axis] - 1 + one), axis) for one in (0, 1))
+            last = phases.shape[axis] - 1
+            before, after = (np.take(phases, range(one, last + one), axis) for one in (0, 1))
             between = (before + after) / np.float32(2)
+            if axis == 4:  # between pixels, the last column lies outside the picture, and is nobody's neighbour
+                between[:, 1:, ..., last - 1 :] = before[:, 1:, ..., last - 1 :]
             for one in (0, 1):
-                place = (slice(None),) * axis + (slice(one, phases.shape[axis] - 1 + one),)
+                place = (slice(None),) * axis + (slice(one, last + one),)
                 np.minimum(least[place], between, out=least[place])
                 np.maximum(largest[place], between, out=largest[place])
         return cls(least, largest)
