@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from matbench.algorithms.fusion import Fusion, better_half, support
+from matbench.algorithms.fusion import Fusion, better_half, charge, support
 from matbench.algorithms.similarity import Matcher, Matching
 from matbench.scene import Range, Scene
 
@@ -214,3 +214,11 @@ def test_another_reference_view_is_in_every_pair(view):
 def test_a_wrong_value_names_the_parameter(name):
     with pytest.raises(ValueError, match=name):
         Fusion(**{name: -1.0})
+
+
+def test_what_is_not_material_is_charged():
+    rng = np.random.default_rng(0)
+    cost, mu = rng.random((2, 3, 4, 21), np.float32)
+    expected = cost + 0.25 * (1 - mu.astype(float))
+    charge(mu, np.float32(0.25), cost)
+    np.testing.assert_allclose(cost, expected, atol=1e-6)

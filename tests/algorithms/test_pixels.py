@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neighbours import random_scene
 
-from matbench.algorithms.pixels import most_costly
+from matbench.algorithms.fusion import ENDED, PRIOR, weigh_seen
+from matbench.algorithms.pixels import most_costly, weigh_pixels
 from matbench.algorithms.similarity import Matcher, Matching
 
 
@@ -39,3 +40,31 @@ def test_a_pixel_is_a_window_of_one(n, height, width, least, extent, fineness, w
 @pytest.mark.parametrize(("channels", "truncation", "most"), [(3, 20.0, 3840), (1, 20.0, 1280), (3, 0.0, 10972)])
 def test_more_than_the_most_costly_difference_costs_no_more(channels, truncation, most):
     assert most_costly(channels, truncation) == most
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    n=st.integers(2, 5),
+    width=st.sampled_from([31, 70, 140]),
+    least=st.integers(-2, 1),
+    fineness=st.integers(1, 3),
+    seed=st.integers(0, 99),
+)
+def test_what_no_view_sees_is_not_compared_and_not_missed(n, width, least, fineness, seed):
+    view, rng = seed % n, np.random.default_rng(seed)
+    scene = random_scene(n, 3, width, least, least + 4, seed)
+    matcher = Matcher.of(scene, Matching(views=0, fineness=fineness, window=1)).with_reference(view)
+    space, features = matcher.space, matcher.phases()
+    # some columns end near, others far: runs of pixels that see a point, and of those that do not
+    ends = np.repeat(rng.uniform(0, space.planes - 1, (n, 3, 1 + width // 40)), 40, axis=2)[..., :width]
+    maps = np.clip(ends + rng.normal(0, 0.3, ends.shape), 0, space.planes - 1).astype(np.float32)
+    spans = np.stack([matcher.ray_spans(view, j) for j in range(n)])
+    shape, hidden = (2, 3, space.planes, width), np.float32(0.72)
+    found, expected = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    weigh_pixels(
+        features, maps, view, *matcher.pixel_criterion(features), spans, fineness, 0, np.float32(PRIOR),
+        np.float32(ENDED), hidden, *found,
+    )  # fmt: skip
+    rho = matcher.rays(features, 0, 3)
+    weigh_seen(rho, matcher.pairs, maps, view, spans, 0, fineness, hidden, *expected)
+    np.testing.assert_allclose(found, expected, atol=1e-6)
