@@ -16,12 +16,13 @@ from matbench.algorithms.materiality.descent import Descent
 from matbench.algorithms.materiality.edges import edge_weights
 from matbench.algorithms.materiality.objective import Energy
 from matbench.algorithms.materiality.parameters import EnergyTerms, Solver, silent
+from matbench.algorithms.materiality.sharp import SharpEnergy
 from matbench.algorithms.materiality.start import start
 from matbench.algorithms.ray_ends import rays_end_near, seen_near
 from matbench.algorithms.similarity import FULL, Matcher, Matching
 from matbench.parameters import flat
 from matbench.scene import Scene
-from matbench.space import Volume
+from matbench.space import DisparitySpace, Volume
 
 
 @flat
@@ -107,9 +108,7 @@ class Materiality:
             mu = start(matcher, rho, solver.start == "soft", solver.sharpness, threads)
             held = mu.nbytes + max(rho.nbytes, inference.volume_bytes(matcher, refined=True) if solver.passes else 0)
             del rho
-            rays = [by_ray(seen_rays(mu, space, view, threads)) for view in range(space.views)]
-            # a view in which nothing is material ends in the farthest plane
-            maps = np.nan_to_num(np.stack([fill_from_background(found) for found in rays]))
+            maps = self._rays_end(mu, space, threads)
         for number in range(solver.passes):
             found, *energies = inference.refined_maps(
                 matcher, maps, solver.material, threads, ratios, solver.visibility
@@ -129,10 +128,10 @@ class Materiality:
                 )
             if solver.tolerance and changed < solver.tolerance:
                 break
-        wanted = context.volume or probe.active or solver.binarization != "volume"
+        wanted = context.volume or probe.active or solver.binarization in ("plane", "ray")
         solid = consensus(space, maps, threads) if wanted else None
         answer = maps[matcher.scene.ref]
-        if solid is not None and solver.binarization != "volume":
+        if solid is not None and solver.binarization in ("plane", "ray"):
             answer = self._binarize(matcher, solid, threads)
         sure = ratios
         if solver.confidence != "costs" or not solver.infers:
@@ -171,10 +170,11 @@ class Materiality:
         descent = Descent(solver.passes, solver.optimiser == "fista", energy.safe_step, solver.tolerance, threads)
         mu, history, passes, updates = descent.run(energy, mu, tell if probe.active else None)
         fixed = rho.nbytes + mu.nbytes + sum(weights.nbytes for weights in energy.weights)
-        by_volume = solver.binarization == "volume"
+        infers = solver.binarization in ("volume", "maps")
+        compared += self.inference.comparisons(matcher) if solver.binarization == "maps" else 0
         answer = self._infer(matcher, mu, rho, threads)
         sure = seen_near(seen_rays(mu, space, matcher.scene.ref, threads), answer, threads)
-        inferring = self.inference.volume_bytes(matcher, refined=True) if by_volume else 0
+        inferring = self.inference.volume_bytes(matcher, refined=True) if infers else 0
         return Estimate(
             disparity={self._reference(matcher): matcher.disparity(answer)},
             confidence={self._reference(matcher): sure},
@@ -200,6 +200,12 @@ class Materiality:
             name = f"similarity/{matcher.indices[i]}-{matcher.indices[j]}"
             probe.volume(name, Volume(matcher.space, values, matcher.indices))
 
+    @staticmethod
+    def _rays_end(mu: NDArray[np.float32], space: DisparitySpace, threads: int) -> NDArray[np.float32]:
+        """(views, H, W) planes where mu V is largest on the rays; where nothing is material, the farthest plane."""
+        rays = [by_ray(seen_rays(mu, space, view, threads)) for view in range(space.views)]
+        return np.nan_to_num(np.stack([fill_from_background(found) for found in rays]))
+
     def _target(self, matcher: Matcher) -> float:
         """N: how many materialities one epipolar plane should hold."""
         space = matcher.space
@@ -213,7 +219,7 @@ class Materiality:
             weights = edge_weights(matcher.rows, space, terms.edge, threads)
         else:
             weights = (np.ones((space.rows, 0, 0), np.uint8), np.ones((space.rows, 0, 0), np.uint8))
-        return Energy(
+        return (SharpEnergy if terms.form == "linear" else Energy)(
             space=space,
             pairs=matcher.pairs,
             rho=rho,
@@ -236,6 +242,10 @@ class Materiality:
         self, matcher: Matcher, mu: NDArray[np.float32], rho: NDArray[np.uint8], threads: int
     ) -> NDArray[np.float32]:
         """(H, W) planes on the reference view's rays."""
+        if self.solver.binarization == "maps":
+            ends = self._rays_end(mu, matcher.space, threads)
+            maps, *_ = self.inference.refined_maps(matcher, ends, self.solver.material, threads)
+            return np.asarray(maps[matcher.scene.ref])
         if self.solver.binarization != "volume":
             return self._binarize(matcher, mu, threads)
         view, space = matcher.scene.ref, matcher.space

@@ -12,7 +12,8 @@ Start = Literal["mean", "soft", "consensus"]
 Count = Literal["row", "global"]
 Target = Literal["image", "union"]
 Optimiser = Literal["fixed_point", "gradient", "fista"]
-Binarization = Literal["plane", "ray", "volume"]
+Binarization = Literal["plane", "ray", "volume", "maps"]
+Terms = Literal["squares", "linear"]
 Confidence = Literal["materiality", "costs", "both"]
 
 
@@ -45,7 +46,8 @@ class Solver:
         ``volume``: semi-global over the whole map at once, with the cost of a point
         (sum V_ij (1 - rho_ij) + 0.25 hidden) / (sum V_ij + 0.25) + material (1 - mu), V_ij being the
         product of the visibilities of the pair's views other than the reference; at the fixed point
-        the maps of the last pass are the answer.
+        the maps of the last pass are the answer; ``maps``, of a descent: rays of all views end where mu V is
+        largest, and all maps are then inferred as by a pass of the fixed point.
     visibility
         At the fixed point, whether V says which pairs and rays count at a point. If not, whatever has it in its frustum
         does: costs are those of the start, from the better half of the similarities, and mu is the share of all rays
@@ -86,6 +88,9 @@ class EnergyTerms:
 
     Parameters
     ----------
+    form
+        ``squares`` as in (6) and (8), or ``linear``, (16) and (17): the same where materialities are 0 or 1, but
+        without reward for what lies between.
     count
         lambda of the count term (7).
     counted
@@ -101,6 +106,7 @@ class EnergyTerms:
         Grey levels of difference over which those ties weaken to 1/e.
     """
 
+    form: Terms = field(default="squares", validator=validators.in_(get_args(Terms)))
     count: float = field(default=0.3, validator=validators.ge(0))
     counted: Count = field(default="row", validator=validators.in_(get_args(Count)))
     target: Target = field(default="image", validator=validators.in_(get_args(Target)))
@@ -115,10 +121,10 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
     Inference is left out as far as the window decides (`Inference.silent`).
     """
     descends, some = solver.descends, solver.passes > 0
-    infers = solver.infers
-    by_volume = descends and solver.binarization == "volume"
+    infers = solver.infers or (descends and solver.binarization == "maps")
+    by_volume, by_maps = (descends and solver.binarization == kind for kind in ("volume", "maps"))
     minimises = descends and some
-    inference = "start=consensus" if descends else "start=consensus or passes above 0"
+    inference = "start=consensus or binarization=maps" if descends else "start=consensus or passes above 0"
     minimisation = "passes above 0" if descends else "optimiser=gradient or fista"
     ties = energy.across > 0 or energy.along > 0
     fewest = 3 if descends else 2  # a pass is compared with the one before, and the last need not be stopped
@@ -128,7 +134,7 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
         "surfaces": (infers, inference),
         **dict.fromkeys(
             ("hidden", "small_step", "large_step", "contrast"),
-            (infers or by_volume, f"{inference} or binarization=volume" if descends else inference),
+            (infers or by_volume, f"{inference} or volume" if descends else inference),
         ),
         "sharpness": (solver.start == "soft", "start=soft"),
         "confidence": (
@@ -137,12 +143,16 @@ def silent(matching: Matching, solver: Solver, energy: EnergyTerms) -> Mapping[s
         ),
         "tolerance": (solver.passes >= fewest, f"passes above {fewest - 1}"),
         "visibility": (some and not descends, "optimiser=fixed_point" if descends else "passes above 0"),
-        "material": (by_volume if descends else some, "binarization=volume" if descends else "passes above 0"),
+        "binarization": (descends or solver.binarization != "maps", "optimiser=gradient or fista"),
+        "material": (
+            by_volume or by_maps if descends else some,
+            "binarization=volume or maps" if descends else "passes above 0",
+        ),
         "target": (
             solver.binarization == "plane" or (minimises and energy.count > 0),
             "binarization=plane, or optimiser=gradient or fista with count above 0",
         ),
-        **dict.fromkeys(("count", "counted", "across", "along", "edge"), (minimises, minimisation)),
+        **dict.fromkeys(("form", "count", "counted", "across", "along", "edge"), (minimises, minimisation)),
     }
     if minimises:
         takes["counted"] = energy.count > 0 or energy.across == 0, "count above 0 or across=0"

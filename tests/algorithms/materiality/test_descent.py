@@ -101,6 +101,8 @@ def test_presets_descend(name):
         {"mending": 0},
         {"binarization": "plane"},
         {"binarization": "ray"},
+        {"binarization": "maps"},
+        {"form": "linear"},
         {"hidden": 0.0},
         {"material": 1.0},
         {"small_step": 2.0},
@@ -122,6 +124,16 @@ def test_every_switch_changes_something(change):
         assert not np.array_equal(one.disparity[2], other.disparity[2], equal_nan=True)
     else:
         assert not same_volume
+
+
+def test_read_as_maps_a_descent_ends_with_a_pass_of_the_fixed_point():
+    scene = box(noise="6")
+    idle = evolve(FISTA, passes=0, binarization="maps").solve(scene, Context())
+    # nothing has descended: but for rays that are read from mu instead of the maps, it is the fixed point
+    default = evolve(FISTA, optimiser="fixed_point", passes=1).solve(scene, Context())
+    apart = np.abs(idle.disparity[scene.ref] - default.disparity[scene.ref]) * scene.pair_steps
+    assert (apart < 0.5).mean() > 0.97
+    assert idle.work["pair_similarities"] > default.work["pair_similarities"]
 
 
 class Listener(Probe):

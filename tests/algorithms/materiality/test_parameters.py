@@ -47,6 +47,7 @@ def test_presets_set_nothing_that_is_not_read(name):
 
 SILENT = [
     ({}, "count=1.0 counted=global target=union across=1.0 along=1.0 edge=5.0 sharpness=5.0 sigma=5.0 tolerance=0.1"),
+    ({}, "form=linear"),
     ({"passes": 0}, "material=0.1 tolerance=0.1 visibility=false"),
     (
         {"passes": 0, "start": "soft"},
@@ -83,6 +84,14 @@ def test_what_changes_nothing_is_refused_and_changes_nothing(base, options):
         other = silent.solve(scene, Context())
         np.testing.assert_array_equal(other.disparity[1], found.disparity[1])
         np.testing.assert_array_equal(other.volume.values, found.volume.values)
+
+
+def test_only_a_descent_is_read_as_maps():
+    with pytest.raises(ValueError, match="binarization=maps changes nothing"):
+        Materiality(binarization="maps")
+    assert not Materiality(optimiser="fista", start="soft", binarization="maps").silent.keys() & {
+        "adaptive", "mending", "material", "hidden", "small_step",
+    }  # fmt: skip
 
 
 def test_ties_read_the_colours_that_a_census_does_not():
