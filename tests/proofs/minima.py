@@ -6,8 +6,8 @@
 For each form of the energy (`SETTINGS`), its terms are taken at several maps: the truth, the answer of the default, and
 where the descent ends, once from its start and once from the truth. If the descent from the truth leaves it, and ends
 no higher than the other, then it is the energy that prefers a wrong answer, and no better optimiser helps. Energies
-are per pixel, less the sum of rho^2. Beside them: the wrong pixels of the map read from mu alone, ray by ray; of the default
-those of its own map.
+are per pixel, less the sum of rho^2. Beside them: the wrong pixels of the map read from mu alone, ray by ray; of the
+default those of its own map. All is without `surfaces`.
 
 Computed scenes have exact materialities. Of real ones only some views have truth: there the truth and the default are
 those views' surfaces, and what no such view sees is empty in both.
@@ -73,7 +73,7 @@ def truth_of(scene: Scene, matcher: Matcher, name: str) -> tuple[Floats, Mapping
 def rows_of(name: str, passes: int, scene: Scene | None = None) -> Iterator[tuple[object, ...]]:
     """Rows of `COLUMNS`."""
     scene = load_scene(name) if scene is None else scene
-    plain = Materiality(**Materiality.presets["descent"])  # type: ignore[arg-type]
+    plain = Materiality(**Materiality.presets["descent"], surfaces=False)  # type: ignore[arg-type]
     matcher = Matcher.of(scene, plain.matching)
     space, rho, inference = matcher.space, matcher.all(), plain.inference
     first = inference.initial_maps(matcher)

@@ -26,6 +26,7 @@ from matbench.scene import Scene
 from matbench.scenes.catalogue import load_scene, select
 
 NEITHER, MU, V, BOTH = "neither", "mu", "V", "both"
+EQUAL: Mapping[str, object] = {"surfaces": False}  # a pass takes the surfaces of the first maps over by mu alone
 SWITCHES: Mapping[str, Mapping[str, object]] = {
     NEITHER: {"visibility": False, "material": 0.0},
     MU: {"visibility": False},
@@ -48,7 +49,7 @@ def scores(scene: Scene, name: str, methods: Sequence[str] = tuple(SWITCHES)) ->
     metric, masks = metric_named(METRIC), masks_of(scene)
     known = int(masks["all"].sum())
     for method in methods:
-        found = Materiality(**SWITCHES[method]).solve(scene, Context(volume=False)).disparity[scene.ref]  # type: ignore[arg-type]
+        found = Materiality(**EQUAL, **SWITCHES[method]).solve(scene, Context(volume=False)).disparity[scene.ref]  # type: ignore[arg-type]
         for region, mask in masks.items():
             value = score(found, scene.truth[scene.ref], mask, scene.pair_steps, [metric], scene)[METRIC]
             yield method, name, region, value, int(mask.sum()), known
