@@ -73,7 +73,7 @@ class Materiality:
             "passes": 50,
             "binarization": "plane",
         },
-        "descent": {"views": 5, "optimiser": "fista", "passes": 5},
+        "descent": {"optimiser": "fista", "passes": 5, "binarization": "maps"},
     }
 
     matching: Matching = field(factory=Matching)

@@ -73,7 +73,7 @@ def truth_of(scene: Scene, matcher: Matcher, name: str) -> tuple[Floats, Mapping
 def rows_of(name: str, passes: int, scene: Scene | None = None) -> Iterator[tuple[object, ...]]:
     """Rows of `COLUMNS`."""
     scene = load_scene(name) if scene is None else scene
-    plain = Materiality(**Materiality.presets["descent"], surfaces=False)  # type: ignore[arg-type]
+    plain = Materiality(**Materiality.presets["descent"], views=5, surfaces=False)  # type: ignore[arg-type]
     matcher = Matcher.of(scene, plain.matching)
     space, rho, inference = matcher.space, matcher.all(), plain.inference
     first = inference.initial_maps(matcher)
