@@ -138,7 +138,7 @@ def main() -> None:
     for line in sys.stdin:
         with suppress(Exception):  # its cells will tell
             (method,) = methods(line.strip())
-            algorithm(method.algorithm).make(method.params).solve(scene, Context(volume=False))
+            algorithm(method.algorithm).make(method.params).solve(scene, Context())  # as the warm-up of its cells does
         sys.stdout.write("done\n")
         sys.stdout.flush()
 
