@@ -114,6 +114,10 @@ def mixed_similarities() -> Work:
     return partial(_matcher().rays, _matcher().phases(), 0, ROWS)
 
 
+def pixel_similarities() -> Work:
+    return partial(_matcher().rays, _matcher().phases(), 0, ROWS, 1)
+
+
 def ssd_similarities() -> Work:
     return partial(_matcher("materiality[preset=paper]").block, 0, ROWS)
 
@@ -133,6 +137,11 @@ def seen_pairs() -> Work:
     cost, material = np.empty((2, rho.shape[0], *rho.shape[2:]), np.float32)
     kernel, hidden = _of("fusion", "weigh_seen"), np.float32(0.7)
     return partial(kernel, rho, matcher.pairs, _maps(), view, spans, 0, space.fineness, hidden, cost, material)
+
+
+def seen_pixels() -> Work:
+    """What pairs that see a point cost, and the support around it."""
+    return partial(_of("fusion", "Fusion")().seen_cost, _matcher(), _maps(), 1, _matcher().phases())
 
 
 def support() -> Work:
@@ -268,9 +277,11 @@ def handing_on() -> Work:
 
 KERNELS: Mapping[str, Callable[[], Work]] = {
     "mixed similarities": mixed_similarities,
+    "pixel similarities": pixel_similarities,
     "ssd similarities": ssd_similarities,
     "better half": better_half,
     "seen pairs": seen_pairs,
+    "seen pixels": seen_pixels,
     "support": support,
     "semi-global": semi_global,
     "winner": winner,
