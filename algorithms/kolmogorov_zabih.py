@@ -95,7 +95,7 @@ class KolmogorovZabih:
         pairs = view_pairs(chosen.n, self.pairs, chosen.ref)
         between = Interactions.of(chosen, space, pairs, self.similarity, context.threads, by_ranges=self.ranges)
         rule = 1.0 if self.ranges else EXACT
-        reward = self.reward or OWN[self.similarity] or rule * between.usual_difference()
+        reward = self.reward or OWN[self.similarity] or rule * between.usual_difference(self.ranges)
         weights = [self.prices.weights(view, reward / 5) for view in chosen.views]
         down, right = (np.rint(np.stack(part) * between.units).astype(np.int32) for part in zip(*weights, strict=True))
         nothing = np.zeros((0, 0, 0, 0), np.int32)

@@ -105,19 +105,21 @@ class Interactions:
             over_rows(lambda top, end, join=join, out=out[p]: join(top, end, out), space.rows, threads)  # type: ignore[misc]
         return cls(pairs, shifts, out, units)
 
-    def usual_difference(self) -> float:
+    def usual_difference(self, both_ways: bool = False) -> float:
         """What homologues of the first plausible planes usually differ by; the authors' rule for K.
 
         The mean, over pixels and pairs, of one of the smallest differences over the planes: that of rank
-        (planes + 2) / 4, but at least the third.
+        (planes + 2) / 4, but at least the third. Pixels are those of the left views; `both_ways`, of either view, so
+        that it is the same in a mirror.
         """
         planes = self.differences.shape[2]
         rank = min(planes, max(3, (planes + 2) // 4)) - 1
         total, count = 0, 0
-        for part in self.differences:
-            ranked = np.partition(part, rank, axis=1)[:, rank]
-            known = ranked[ranked != UNKNOWN]
-            total, count = total + int(known.sum(dtype=np.int64)), count + known.size
+        for part, shifts in zip(self.differences, self.shifts, strict=True):
+            for seen in (part, _from_right(part, shifts)) if both_ways else (part,):
+                ranked = np.partition(seen, rank, axis=1)[:, rank]
+                known = ranked[ranked != UNKNOWN]
+                total, count = total + int(known.sum(dtype=np.int64)), count + known.size
         return total / max(1, count) / self.units
 
     def rewards(self, most: float) -> NDArray[np.int16]:
@@ -125,6 +127,16 @@ class Interactions:
         limit = round(min(most * self.units, MOST))
         # what is UNKNOWN is above any limit
         return np.stack([np.minimum(part, limit).astype(np.int16) - np.int16(limit) for part in self.differences])
+
+
+def _from_right(part: NDArray[np.uint16], shifts: NDArray[np.int64]) -> NDArray[np.uint16]:
+    """The (H, planes, W) differences of a pair at the pixels of the right view."""
+    out, width = np.full_like(part, UNKNOWN), part.shape[2]
+    for plane, shift in enumerate(shifts.tolist()):
+        low, high = max(0, -shift), min(width, width - shift)
+        if low < high:
+            out[:, plane, low + shift : high + shift] = part[:, plane, low:high]
+    return out
 
 
 def _differences(

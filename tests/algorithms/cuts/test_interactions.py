@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from attrs import evolve
 from boxes import box_before_wall
 
 from matbench.algorithms.cuts.interactions import UNKNOWN, Interactions, join_ways
@@ -73,3 +74,17 @@ def test_the_usual_difference_is_one_of_the_smallest_of_each_pixel():
     known[found.differences == UNKNOWN] = np.inf
     ranked = np.sort(known, axis=2)[:, :, rank]
     assert found.usual_difference() == pytest.approx(ranked[np.isfinite(ranked)].mean() / found.units)
+
+
+@pytest.mark.parametrize("fineness", [1, 2])
+def test_either_way_the_usual_difference_is_the_same_in_a_mirror(fineness):
+    views = np.random.default_rng(2).integers(0, 256, (3, 6, 24, 3)).astype(np.uint8)
+    scene = box_before_wall(n=3, height=6, width=24)
+    found = []
+    for seen in (views, views[::-1, :, ::-1].copy()):
+        shown = evolve(scene, views=seen, truth={}, regions={}, visible={})
+        space = search_space(shown, fineness)
+        between = Interactions.of(shown, space, view_pairs(3, "consecutive", 1), "published", 1, by_ranges=True)
+        found.append(between.usual_difference(both_ways=True))
+    assert found[0] == pytest.approx(found[1])
+    assert found[0] > 0
