@@ -47,7 +47,7 @@ class Inference:
 
     @staticmethod
     def comparisons(matcher: Matcher) -> int:
-        """How many pairs of windows the maps of all views take."""
+        """How many pairs of windows the maps of all views take at most: second maps leave out what no view sees."""
         return sum(matcher.with_reference(view).ray_comparisons for view in range(matcher.space.views))
 
     def initial_maps(

@@ -117,15 +117,15 @@ def test_without_a_volume_the_map_is_the_same():
 
 def test_it_stops_when_few_pixels_change():
     scene = box()
-    shares = Materiality(passes=4).solve(scene, Context()).history["changed"]
+    shares = Materiality(passes=4, surfaces=False).solve(scene, Context()).history["changed"]
     assert shares[0] > shares[1] > 0
     between = (shares[0] + shares[1]) / 2
-    stopped = Materiality(passes=4, tolerance=between).solve(scene, Context())
+    stopped = Materiality(passes=4, surfaces=False, tolerance=between).solve(scene, Context())
     assert stopped.history["changed"] == shares[:2]
     assert stopped.work["passes"] == 2
-    two = Materiality(passes=2).solve(scene, Context())
+    two = Materiality(passes=2, surfaces=False).solve(scene, Context())
     np.testing.assert_array_equal(stopped.disparity[scene.ref], two.disparity[scene.ref])
-    at_once = Materiality(passes=4, tolerance=shares[0]).solve(scene, Context()).history["changed"]
+    at_once = Materiality(passes=4, surfaces=False, tolerance=shares[0]).solve(scene, Context()).history["changed"]
     assert at_once == shares[:2], "less than this share, not as much"
 
 
