@@ -156,10 +156,10 @@ def _see(found, k, similar, total, reached, ended):  # type: ignore[no-untyped-d
 
 
 @helper
-def _share_out(total, reached, ended):  # type: ignore[no-untyped-def]
+def _share_out(total, reached, ended, material):  # type: ignore[no-untyped-def]
     for x in range(total.size):
         total[x] /= reached[x]
-        ended[x] /= reached[x]
+        material[x] = ended[x] / reached[x]
 
 
 @kernel
@@ -183,13 +183,15 @@ def weigh_pixels(  # type: ignore[no-untyped-def]
     samples = features.rows.shape[4]
     differing, compared = np.zeros(samples, np.uint8), np.zeros(samples, np.uint8)
     order, similar = np.zeros(samples, np.uint16), np.zeros(samples, np.uint8)
-    reached, least = np.empty(width, np.float32), np.empty((views, (width + PIXELS - 1) // PIXELS), np.float32)
+    # rows of `material` at the seam of two threads are found by both: each adds up by itself, and both write the same
+    reached, ended = np.empty(width, np.float32), np.empty(width, np.float32)
+    least = np.empty((views, (width + PIXELS - 1) // PIXELS), np.float32)
     for y in range(cost.shape[0]):
         row = y0 + y
         for j in range(views):
             _least(maps[j, row], least[j])
         for k in range(cost.shape[1]):
-            total, ended = cost[y, k], material[y, k]
+            total = cost[y, k]
             fill(prior * hidden, total)
             fill(prior, reached)
             fill(ended_before, ended)
@@ -224,7 +226,7 @@ def weigh_pixels(  # type: ignore[no-untyped-def]
                             ended[low + begin : low + stop],
                         )
                     begin = end + PIXELS
-            _share_out(total, reached, ended)
+            _share_out(total, reached, ended, material[y, k])
 
 
 def most_costly(channels: int, truncation: float) -> np.uint16:

@@ -83,6 +83,10 @@ def stage(line: str) -> int:
     return STAGES.index(command(line)) if command(line) in STAGES else -1
 
 
+def _six_worlds() -> list[str]:
+    return [one for seed in range(6) for one in _small(f"synthetic/world-{seed}")]
+
+
 def shortened(line: str, **places: str) -> list[str]:
     """The words of a line by the rules above.
 
@@ -96,7 +100,7 @@ def shortened(line: str, **places: str) -> list[str]:
         if before in ("--row", "--rows"):
             out.append(",".join(str(int(row) // 6) for row in token.split(",")))
         elif before == "-s" and "--until" in tokens:
-            out += [one for seed in range(6) for one in _small(f"synthetic/world-{seed}")]
+            out += _six_worlds()
         elif before == "-s" or token.startswith(("synthetic/", "worlds/")):
             out += _small(token)
         elif before == "--jobs":
@@ -105,7 +109,8 @@ def shortened(line: str, **places: str) -> list[str]:
             out.append(places.get(token, token))
     if tokens[0] == "compare":
         out += [] if "-a" in tokens else ["-a", "sgbm"]
-        out += [] if "-s" in tokens else ["-s", *_small("synthetic/box")]
+        if "-s" not in tokens:
+            out += ["-s", *(_six_worlds() if "--until" in tokens else _small("synthetic/box"))]
     if tokens[0] in RUNS and not {"--jobs", "--dask"} & set(tokens):
         out += ["--isolation", "shared"]
     return [*out, "--dry-run"] if tokens[0] == "fetch" else out

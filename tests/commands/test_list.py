@@ -38,7 +38,7 @@ def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
     )
     lines = [line.strip("│ ") for line in out.splitlines()]
     energy = lines.index("energy:")
-    assert lines[energy + 1] == "count=0.3: a number"
+    assert lines[energy + 1 : energy + 3] == ["form=squares: squares or linear", "count=0.3: a number"]
 
 
 PLUGINS = """\
