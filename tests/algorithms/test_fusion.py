@@ -222,3 +222,12 @@ def test_what_is_not_material_is_charged():
     expected = cost + 0.25 * (1 - mu.astype(float))
     charge(mu, np.float32(0.25), cost)
     np.testing.assert_allclose(cost, expected, atol=1e-6)
+
+
+def test_threads_that_find_the_same_rows_do_not_disturb_one_another():
+    matcher = random_matcher(3, 64, 40, 0, 4, pairs="reference", fineness=1, window=3, similarity="mixed")
+    maps = np.random.default_rng(1).uniform(0, 4, (3, 64, 40)).astype(np.float32)
+    alone = Fusion().seen_cost(matcher, maps, 1)
+    for _ in range(300):
+        for found, expected in zip(Fusion().seen_cost(matcher, maps, 2), alone, strict=True):
+            np.testing.assert_array_equal(found, expected)
