@@ -27,17 +27,18 @@ _SIZE = 16, 64  # rows and columns of the noise
 
 
 def methods_to_compile(methods: Iterable[Method], kept: Path) -> list[str]:
-    """Selectors of those methods that run by default, if no kernels at all are kept in that folder yet; else none.
+    """Selectors of those methods that run by default, if that folder keeps no kernels of the code as it is; else none.
 
     In the order in which to compile them: first what brings most code, then what adds most to it. So two that share
     their kernels are not compiled at once, each for itself.
     """
-    if next(kept.rglob("*.nbi"), None) is not None:
-        return []
     # the others may need files of the user's, or run programs, which only a keeper's process may
     own = set(plugins.default_algorithms())
     left = {method.algorithm: method for method in methods if not method.file and method.algorithm in own}
     code = {name: _sizes(name) for name in left}
+    changed = max((_written(file) for sizes in code.values() for file in sizes), default=0.0)
+    if any(_written(kernel) > changed for kernel in kept.rglob("*.nbi")):
+        return []
     claimed: set[Path] = set()
     found = []
     while left:
@@ -52,6 +53,14 @@ def _sizes(algorithm: str) -> dict[Path, int]:
     """File -> bytes, of all code of a method."""
     files = plugins.code_of(plugins.installed("algorithms")[algorithm]).files.values()
     return {file: file.stat().st_size for file in files}
+
+
+def _written(file: Path) -> float:
+    """When a file was written; 0 if it is gone."""
+    try:
+        return file.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 @define(eq=False)

@@ -28,8 +28,11 @@ def test_only_methods_that_run_by_default_and_only_without_kernels(tmp_path: Pat
     methods = [method_of("sgbm"), method_of("okutomi_kanade", "window=9"), *own]
     assert methods_to_compile(methods, tmp_path) == ["okutomi_kanade[window=9]", "sgbm"]
     (tmp_path / "deep").mkdir()
-    (tmp_path / "deep" / "kernel.nbi").touch()
+    kernel = tmp_path / "deep" / "kernel.nbi"
+    kernel.touch()
     assert methods_to_compile(methods, tmp_path) == []
+    os.utime(kernel, (1, 1))
+    assert methods_to_compile(methods, tmp_path) == ["okutomi_kanade[window=9]", "sgbm"], "of code before"
 
 
 def test_who_shares_most_with_the_others_is_last(tmp_path: Path) -> None:
