@@ -10,6 +10,7 @@ from matbench.algorithms.kernels import fill, helper, kernel, literal
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.peak_ratio import peak_ratio
 from matbench.algorithms.room import Room
+from matbench.algorithms.turning import EACH, turn_volume
 
 
 @helper
@@ -116,36 +117,6 @@ def _sweep(cost, image, small, large, border, spread, forward, fresh, total):  #
                     _take(path, least[d, new, 1 : 1 + columns], total[y, k, :columns])
 
 
-_EACH, _BAND = 4, 128  # numbers in a word; rows that are turned together, so that lines of the cache are filled
-_EVEN, _FIRST = np.uint64(0x0000FFFF0000FFFF), np.uint64(0x00000000FFFFFFFF)
-_ONE, _TWO = np.uint64(16), np.uint64(32)
-
-
-@helper
-def _turn_rows(rows, out):  # type: ignore[no-untyped-def]
-    """Turns squares of four by four 16-bit numbers, of which four rows are four words."""
-    for y in range(rows.shape[0] // _EACH):
-        r0, r1, r2, r3 = rows[_EACH * y], rows[_EACH * y + 1], rows[_EACH * y + 2], rows[_EACH * y + 3]
-        for x in range(rows.shape[1]):
-            a, b, c, d = r0[x], r1[x], r2[x], r3[x]
-            top_even, top_odd = (a & _EVEN) | ((b & _EVEN) << _ONE), ((a >> _ONE) & _EVEN) | (b & ~_EVEN)
-            low_even, low_odd = (c & _EVEN) | ((d & _EVEN) << _ONE), ((c >> _ONE) & _EVEN) | (d & ~_EVEN)
-            out[_EACH * x, y] = (top_even & _FIRST) | (low_even << _TWO)
-            out[_EACH * x + 1, y] = (top_odd & _FIRST) | (low_odd << _TWO)
-            out[_EACH * x + 2, y] = (top_even >> _TWO) | (low_even & ~_FIRST)
-            out[_EACH * x + 3, y] = (top_odd >> _TWO) | (low_odd & ~_FIRST)
-
-
-@kernel
-def _turn(volume, first, end, out):  # type: ignore[no-untyped-def]
-    """Turns some planes of (rows, planes, columns) volumes of 16-bit numbers, given as words."""
-    rows = volume.shape[0]
-    for top in range(0, rows, _BAND):
-        bottom = min(rows, top + _BAND)
-        for k in range(first, end):
-            _turn_rows(volume[top:bottom, k], out[:, k, top // _EACH : bottom // _EACH])
-
-
 def penalties(small: float, large: float, edge: float) -> NDArray[np.float32]:
     """(256,) P2 by contrast to the previous pixel: max(P1, P2 exp(-contrast / edge)), in grey levels."""
     return np.maximum(small, large * np.exp(-np.arange(256) / edge)).astype(np.float32)
@@ -166,15 +137,6 @@ def _units(top: float, table: NDArray[np.float32]) -> tuple[type[np.uint16 | np.
     if most == 0 or small * top >= COARSEST:
         return np.uint16, small
     return np.uint32, min(large, (1 << 23) / top) if top else large
-
-
-def _turn_volume(volume: NDArray[Any], out: NDArray[Any], threads: int) -> None:
-    """out = (columns, planes, rows) the same volume of the turned picture; rows and columns are multiples of four."""
-    if volume.itemsize == 2:
-        words, turned = volume.view(np.uint64), out.view(np.uint64)
-        over_rows(lambda first, end: _turn(words, first, end, turned), volume.shape[1], threads)
-    else:
-        np.copyto(out, volume.T)
 
 
 def _add_paths(
@@ -250,14 +212,14 @@ def aggregate(
     steps = kind(round(small * unit)), np.rint(table.astype(float) * unit).astype(kind), kind(border)
     rows, planes, columns = cost.shape
     room = room or Room()
-    shape = -(-rows // _EACH) * _EACH, planes, -(-columns // _EACH) * _EACH
+    shape = -(-rows // EACH) * EACH, planes, -(-columns // EACH) * EACH
     whole, total = room.empty("whole", shape, kind), room.empty("total", shape, kind)
     over_rows(lambda top, end: _whole(cost[top:end], np.float32(unit), whole[top:end]), rows, threads)
     turned, along = room.empty("turned", shape[::-1], kind), room.empty("along", shape[::-1], kind)
-    _turn_volume(whole, turned, threads)
+    turn_volume(whole, turned, threads)
     turned_image = np.ascontiguousarray(image.transpose(1, 0, 2))
     _add_paths(turned, turned_image, steps, 0, along, True, room, threads)
-    _turn_volume(along, total, threads)
+    turn_volume(along, total, threads)
     _add_paths(whole, image, steps, 1, total, False, room, threads)
     return total[:rows], unit
 
