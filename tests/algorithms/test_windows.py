@@ -5,13 +5,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neighbours import around, like_middle, random_scene
 
+from matbench.algorithms.features import UNITS, luma
 from matbench.algorithms.sampling import fine_rows
 from matbench.algorithms.similarity import Matcher, Matching
 
 
+def whole(values):
+    """Grey levels rounded to `UNITS`, as the kernels keep them where they mix costs."""
+    return np.rint(values * np.float32(UNITS)).astype(float) / UNITS
+
+
 def slope(row, sample, q):
     """Half the difference of the samples one pixel to either side, those beyond an edge taken from it."""
-    return (row[min(sample + q, row.size - 1)] - row[max(sample - q, 0)]) / 2
+    return whole((row[min(sample + q, row.size - 1)] - row[max(sample - q, 0)]) / np.float32(2))
 
 
 def darker(grey, y, sample, q):
@@ -30,11 +36,12 @@ def differing(order, like):
 def twin(matcher: Matcher) -> np.ndarray:
     """exp(-MSD / sigma^2), exp(-RMS / sigma), 1 - MSD / M or 1 - the mean cost, tap by tap."""
     space, how = matcher.space, matcher.settings
-    rows = fine_rows(matcher.scene.views, space.fineness).astype(float)
+    rows = fine_rows(matcher.scene.views, space.fineness)
+    grey = luma(rows)  # in float32, as a pixel is darker than another by their last bits, too
     if not how.colour:
-        rows = np.repeat(np.tensordot(rows, [0.299, 0.587, 0.114], ([1], [0]))[:, None], 3, axis=1)
+        rows = np.repeat(grey[:, None], 3, axis=1)
+    fine, rows = whole(rows), rows.astype(float)
     limit, radius, q = how.truncation or np.inf, how.window // 2, space.fineness
-    grey = np.tensordot(rows, [0.299, 0.587, 0.114], ([1], [0]))
     out = np.zeros((space.rows, len(matcher.pairs), space.planes, space.columns))
     for y, p, k, c in np.ndindex(out.shape):
         i, j = matcher.pairs[p]
@@ -52,11 +59,12 @@ def twin(matcher: Matcher) -> np.ndarray:
                         continue
                     at = (i, ui + dx), (j, uj + dx)
                     order = [darker(grey[v], y + dy, u, q) for v, u in at]
-                    like = [like_middle(rows[v], y + dy, u, q, how.alike) for v, u in at] if how.alike else None
+                    like = [like_middle(fine[v], y + dy, u, q, how.alike) for v, u in at] if how.alike else None
                     cost = min(differing(order, like), 20) / 20
                     if how.similarity == "mixed":
                         slopes = [slope(grey[v, y + dy], u, q) for v, u in at]
                         cost *= 0.40
+                        gap = fine[i, :, y + dy, ui + dx] - fine[j, :, y + dy, uj + dx]
                         cost += 0.35 * min(np.mean(np.abs(gap)), limit) / 20
                         cost += 0.25 * min(abs(slopes[0] - slopes[1]), 10) / 10
                     taps.append(cost)
