@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import helper, kernel
+from matbench.algorithms.parallel import over_rows
 
 CENSUS_RADIUS = 3  # 7x7 pixels
 CENSUS_BITS = (2 * CENSUS_RADIUS + 1) ** 2 - 1
@@ -27,9 +28,20 @@ def gradient(grey: NDArray[np.float32], fineness: int) -> NDArray[np.float32]:
     return np.asarray((wide[..., 2 * q :] - wide[..., : -2 * q]) * np.float32(0.5), np.float32)
 
 
-def whole(values: NDArray[np.float32], shift: float) -> NDArray[np.uint16]:
+@kernel
+def _whole(values, shift, out):  # type: ignore[no-untyped-def]
+    units = np.float32(UNITS)
+    for x in range(out.size):
+        out[x] = np.uint16(np.int32(np.rint((values[x] + shift) * units)))
+
+
+def whole(values: NDArray[np.float32], shift: float, threads: int = 1) -> NDArray[np.uint16]:
     """Grey levels as whole numbers of `UNITS`, from `shift` below 0 on: twice as many fit a vector."""
-    return np.asarray(np.rint((values + np.float32(shift)) * np.float32(UNITS)), np.uint16)
+    out = np.empty(values.shape, np.uint16)
+    over_rows(
+        lambda view, _: _whole(values[view].ravel(), np.float32(shift), out[view].reshape(-1)), len(out), threads, 1
+    )
+    return out
 
 
 @helper
@@ -41,31 +53,33 @@ def _mark_darker(taps, centre, bits):  # type: ignore[no-untyped-def]
 
 @kernel
 def _census(wide, fineness, bits):  # type: ignore[no-untyped-def]
-    views, _, height, samples = bits.shape
-    for i in range(views):
-        for y in range(height):
-            number = 0
-            for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
-                row = wide[i, min(max(y + dy, 0), height - 1)]
-                middle = CENSUS_RADIUS * fineness
-                centre = wide[i, y, middle : middle + samples]
-                for dx in range(2 * CENSUS_RADIUS + 1):
-                    if dy != 0 or dx != CENSUS_RADIUS:
-                        taps = row[dx * fineness : dx * fineness + samples]
-                        _mark_darker(taps, centre, bits[i, number // WORD, y])
-                        number += 1
+    _, height, samples = bits.shape
+    for y in range(height):
+        number = 0
+        for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
+            row = wide[min(max(y + dy, 0), height - 1)]
+            middle = CENSUS_RADIUS * fineness
+            centre = wide[y, middle : middle + samples]
+            for dx in range(2 * CENSUS_RADIUS + 1):
+                if dy != 0 or dx != CENSUS_RADIUS:
+                    taps = row[dx * fineness : dx * fineness + samples]
+                    _mark_darker(taps, centre, bits[number // WORD, y])
+                    number += 1
 
 
-def census(grey: NDArray[np.float32], fineness: int) -> NDArray[np.uint8]:
+def census(grey: NDArray[np.float32], fineness: int, threads: int = 1) -> NDArray[np.uint8]:
     """(views, 6, H, samples) census: one bit for each of the 48 pixels around, set where it is darker.
 
     The 7x7 pixels are taken row by row from the upper left one, 8 to a word, the first in the
     highest bit. Pixels are `fineness` samples apart; beyond the image's edge its last sample is repeated.
     """
     reach = CENSUS_RADIUS * fineness
-    wide = np.pad(grey, ((0, 0), (0, 0), (reach, reach)), mode="edge")
     bits = np.zeros((len(grey), CENSUS_WORDS, *grey.shape[1:]), np.uint8)
-    _census(wide, fineness, bits)
+
+    def mark(view: int, _: int) -> None:
+        _census(np.pad(grey[view], ((0, 0), (reach, reach)), mode="edge"), fineness, bits[view])
+
+    over_rows(mark, len(bits), threads, 1)
     return bits
 
 
@@ -84,23 +98,22 @@ def _mark_alike(wide, row, other, first, start, most, channels, bits):  # type: 
 
 @kernel
 def _mark_same_surface(wide, fineness, most, channels, bits):  # type: ignore[no-untyped-def]
-    views, _, height, _ = bits.shape
+    height = bits.shape[1]
     middle, any_gap = CENSUS_RADIUS * fineness, np.uint16(65535)
-    for i in range(views):
-        for y in range(height):
-            number = 0
-            for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
-                other = min(max(y + dy, 0), height - 1)
-                for dx in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
-                    if dy == 0 and dx == 0:
-                        continue
-                    limit = any_gap if abs(dx) <= 1 and abs(dy) <= 1 else most
-                    start = middle + dx * fineness
-                    _mark_alike(wide[i], y, other, middle, start, limit, channels, bits[i, number // WORD, y])
-                    number += 1
+    for y in range(height):
+        number = 0
+        for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
+            other = min(max(y + dy, 0), height - 1)
+            for dx in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
+                if dy == 0 and dx == 0:
+                    continue
+                limit = any_gap if abs(dx) <= 1 and abs(dy) <= 1 else most
+                start = middle + dx * fineness
+                _mark_alike(wide, y, other, middle, start, limit, channels, bits[number // WORD, y])
+                number += 1
 
 
-def same_surface(rows: NDArray[np.float32], fineness: int, most: float) -> NDArray[np.uint8]:
+def same_surface(rows: NDArray[np.float32], fineness: int, most: float, threads: int = 1) -> NDArray[np.uint8]:
     """(views, 6, H, samples) which of the 48 pixels of a census are likely on the same surface as the middle one.
 
     A bit is set for each of the eight next to it, and for each whose channels all differ by at most
@@ -113,8 +126,12 @@ def same_surface(rows: NDArray[np.float32], fineness: int, most: float) -> NDArr
         (views, channels, H, samples) colours or luma.
     """
     reach = CENSUS_RADIUS * fineness
-    wide = np.pad(whole(rows, SHIFTS[0]), ((0, 0), (0, 0), (0, 0), (reach, reach)), mode="edge")
     bits = np.zeros((len(rows), CENSUS_WORDS, *rows.shape[2:]), np.uint8)
-    limit = np.uint16(min(round(most * UNITS), 65535))
-    _mark_same_surface(wide, fineness, limit, (0,) * rows.shape[1], bits)
+    limit, channels = np.uint16(min(round(most * UNITS), 65535)), (0,) * rows.shape[1]
+
+    def mark(view: int, _: int) -> None:
+        wide = np.pad(whole(rows[view], SHIFTS[0]), ((0, 0), (0, 0), (reach, reach)), mode="edge")
+        _mark_same_surface(wide, fineness, limit, channels, bits[view])
+
+    over_rows(mark, len(bits), threads, 1)
     return bits

@@ -279,7 +279,7 @@ class Fusion:
         spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
         low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
 
-        features = matcher.phases() if phases is None else phases
+        features = matcher.phases(threads) if phases is None else phases
 
         def combine(top: int, cost: NDArray[np.float32]) -> None:
             rho = matcher.rays(features, top, top + len(cost), self._side)
@@ -319,7 +319,7 @@ class Fusion:
         room = room or Room()
         material = room.empty("material", (space.rows, space.planes, space.width), np.float32)
 
-        features = matcher.phases() if phases is None else phases
+        features = matcher.phases(threads) if phases is None else phases
         side, hidden = self._side, np.float32(self.hidden)
 
         def pixels(top: int, cost: NDArray[np.float32]) -> None:

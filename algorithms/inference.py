@@ -118,7 +118,7 @@ class Inference:
         How sure a view is of its answers is known where it is asked: (views, H, W), or none. The reference view's are
         `ratios`, if there are any (`initial_maps`).
         """
-        space, scene, phases, room = matcher.space, matcher.scene, matcher.phases(), Room()
+        space, scene, phases, room = matcher.space, matcher.scene, matcher.phases(threads), Room()
         maps = np.empty((space.views, space.rows, space.width), np.float32)
         sure = np.empty_like(maps) if self.surfaces else maps[:0]
         energies = np.zeros((space.views, 2))

@@ -56,7 +56,7 @@ def classify(found, trusted, least, step):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def vote(found, image, doubtful, places, colour, distance, least, step, top, end, out):  # type: ignore[no-untyped-def]
+def vote(found, image, doubtful, places, colour, distance, least, most, step, top, end, out):  # type: ignore[no-untyped-def]
     """Weighted median of the trusted neighbours of every doubtful pixel.
 
     Neighbours weigh exp(-|dI| / COLOUR - (|dx| + |dy|) / DISTANCE), with |dI| the largest difference
@@ -76,15 +76,14 @@ def vote(found, image, doubtful, places, colour, distance, least, step, top, end
         Classes of the pixels that may vote (`classify`).
     colour, distance
         (256,) and (REACH + 1,) float32: the weight's factors, by |dI| and by |dx| or |dy|.
-    least, step
-        Pixels per view step.
+    least, most, step
+        Least and largest disparity found, and the width of a class, in pixels per view step.
     out
         (H, W) float32, of which the rows top..end are overwritten.
     """
     height, width = found.shape
     reach = distance.size - 1
     near = np.concatenate((distance[:0:-1], distance))  # by column of the window
-    most = np.nanmax(found)
     votes = np.empty(np.int64((most - least) / step) + 1, np.float32)
     for y in range(top, end):
         for x in range(width):
@@ -157,12 +156,12 @@ def mend(
                 new[view] = maps[view]
                 continue
 
-            least, step = np.float32(np.nanmin(found)), np.float32(pixel / 2)
+            least, most, step = np.float32(np.nanmin(found)), np.float32(np.nanmax(found)), np.float32(pixel / 2)
             doubtful, places = ~trusted, classify(found, trusted, least, step)
 
             def ask(top: int, end: int, view: int = view) -> None:
                 vote(
-                    found, image, doubtful, places, colour, distance, least, step, top, end, new[view],  # noqa: B023
+                    found, image, doubtful, places, colour, distance, least, most, step, top, end, new[view],  # noqa: B023
                 )  # fmt: skip
 
             over_rows(ask, shape[0], threads)

@@ -10,11 +10,40 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from matbench.algorithms.kernels import kernel, literal
+from matbench.algorithms.parallel import over_rows
 from matbench.scene import SAME_PLACE, Scene
 from matbench.space import DisparitySpace
 
 
-def fine_rows(images: NDArray[np.uint8], fineness: int) -> NDArray[np.float32]:
+@literal
+def _between(pixels, weights, phase, fineness, row):  # type: ignore[no-untyped-def]
+    """Samples of one phase, each from the four pixels around it; `pixels` has one more at either end."""
+    w0, w1, w2, w3 = weights[0], weights[1], weights[2], weights[3]
+    for x in range(np.uintp(pixels.size - 3)):
+        row[fineness * x + phase] = (
+            w0 * pixels[x] + w1 * pixels[x + np.uintp(1)] + w2 * pixels[x + np.uintp(2)] + w3 * pixels[x + np.uintp(3)]
+        )
+
+
+@kernel
+def _sample_rows(image, weights, fine):  # type: ignore[no-untyped-def]
+    height, width, channels = image.shape
+    fineness = np.uintp(weights.shape[0])
+    pixels = np.empty(width + 2, np.float32)
+    for c in range(channels):
+        for y in range(height):
+            for x in range(width):
+                pixels[x + 1] = np.float32(image[y, x, c])
+            pixels[0], pixels[width + 1] = pixels[1], pixels[width]
+            row = fine[c, y]
+            for x in range(np.uintp(width)):
+                row[fineness * x] = pixels[x + np.uintp(1)]
+            for phase in range(1, fineness):
+                _between(pixels, weights[phase], np.uintp(phase), fineness, row)
+
+
+def fine_rows(images: NDArray[np.uint8], fineness: int, threads: int = 1) -> NDArray[np.float32]:
     """Sample the rows of images `fineness` times finer by cubic convolution.
 
     Sample m lies at column m / fineness; samples on whole pixels keep their value. The kernel is
@@ -31,27 +60,16 @@ def fine_rows(images: NDArray[np.uint8], fineness: int) -> NDArray[np.float32]:
     -------
     (n, 3, H, q * (W - 1) + 1) float32, colours planar, in grey levels (cubic overshoot included).
     """
-    pixels = np.ascontiguousarray(np.moveaxis(images, 3, 1), dtype=np.float32)
-    width = pixels.shape[3]
-    fine = np.empty((*pixels.shape[:3], fineness * (width - 1) + 1), np.float32)
-    fine[..., ::fineness] = pixels
-    before, after = pixels[..., :1], pixels[..., -1:]
-    padded = np.concatenate([before, pixels, after], axis=3)
-    for phase in range(1, fineness):
-        t = phase / fineness
-        weights = (
-            ((2 - t) * t - 1) * t / 2,
-            ((3 * t - 5) * t * t + 2) / 2,
-            ((4 - 3 * t) * t + 1) * t / 2,
-            (t - 1) * t * t / 2,
-        )
-        fine[..., phase::fineness] = sum(
-            np.float32(w) * padded[..., tap : tap + width - 1] for tap, w in enumerate(weights)
-        )
+    n, height, width, channels = images.shape
+    t = np.arange(fineness) / fineness
+    taps = ((2 - t) * t - 1) * t / 2, ((3 * t - 5) * t * t + 2) / 2, ((4 - 3 * t) * t + 1) * t / 2, (t - 1) * t * t / 2
+    weights = np.stack(taps, axis=1).astype(np.float32)
+    fine = np.empty((n, channels, height, fineness * (width - 1) + 1), np.float32)
+    over_rows(lambda view, _: _sample_rows(images[view], weights, fine[view]), n, threads, 1)
     return fine
 
 
-def by_phase(values: NDArray[np.generic], fineness: int, spare: int = 0) -> NDArray[np.generic]:
+def by_phase(values: NDArray[np.generic], fineness: int, spare: int = 0, threads: int = 1) -> NDArray[np.generic]:
     """Sort finely sampled rows by their phase within a pixel, so that samples a pixel apart lie side by side.
 
     Parameters
@@ -70,9 +88,13 @@ def by_phase(values: NDArray[np.generic], fineness: int, spare: int = 0) -> NDAr
     """
     width = (values.shape[-1] - 1) // fineness + 1
     out = np.zeros((values.shape[0], fineness, *values.shape[1:-1], width + spare), values.dtype)
-    for phase in range(fineness):
-        part = values[..., phase::fineness]
-        out[:, phase, ..., : part.shape[-1]] = part
+
+    def sort(view: int, _: int) -> None:
+        for phase in range(fineness):
+            part = values[view, ..., phase::fineness]
+            out[view, phase, ..., : part.shape[-1]] = part
+
+    over_rows(sort, len(values), threads, 1)
     return out
 
 

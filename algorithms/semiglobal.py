@@ -364,7 +364,13 @@ class SemiGlobal:
         room: Room | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """The same, and (H, W) the `peak_ratio` of the sums of path costs, if it is asked for."""
-        largest = float(np.max(cost, initial=0))
+        tops = np.zeros(len(cost))
+
+        def top_of(first: int, end: int) -> None:
+            tops[first:end] = cost[first:end].max(axis=(1, 2), initial=0)
+
+        over_rows(top_of, len(cost), threads)
+        largest = float(tops.max(initial=0))
         complete = not np.isnan(largest)
         steps = self.small_step, self.large_step, self.contrast
         sums, _ = aggregate(cost, image, *steps, threads, room, largest if complete else None)

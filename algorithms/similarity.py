@@ -153,14 +153,14 @@ class Matcher:
         indices = scene.widest(settings.views or scene.n)
         chosen = scene.choose(indices)
         space = search_space(chosen, settings.fineness)
-        rows = fine_rows(chosen.views, space.fineness)
+        rows = fine_rows(chosen.views, space.fineness, threads)
         grey, form = luma(rows), settings.similarity
         slopes = gradient(grey if form == "mixed" else grey[:, :0], space.fineness)
-        bits = census(grey if form in ("census", "mixed") else grey[:, :0], space.fineness)
+        bits = census(grey if form in ("census", "mixed") else grey[:, :0], space.fineness, threads)
         if not settings.colour:
             rows = grey[:, None]
         is_masked = bits.size and settings.alike
-        masks = same_surface(rows if is_masked else rows[:, :, :0], space.fineness, settings.alike)
+        masks = same_surface(rows if is_masked else rows[:, :, :0], space.fineness, settings.alike, threads)
         described = (
             mccnn.descriptors(grey, space.fineness, threads)
             if form == "mccnn"
@@ -292,10 +292,10 @@ class Matcher:
         over_rows(lambda first, end: self._fill(first, out[first:end]), space.rows, threads)
         return out
 
-    def phases(self) -> Features:
+    def phases(self, threads: int = 1) -> Features:
         """Rows and their features sorted by phase within a pixel, so that every q-th sample is read contiguously."""
         spare = PIXELS if self.settings.similarity == "mixed" else 0
-        parts = (by_phase(part, self.space.fineness, spare) for part in self._compared)
+        parts = (by_phase(part, self.space.fineness, spare, threads) for part in self._compared)
         return Features(*parts, self.descriptors)  # type: ignore[call-arg, arg-type]
 
     def _fill(self, first: int, out: NDArray[np.uint8]) -> None:

@@ -13,91 +13,157 @@ LEAST = 0.02  # how sure any pixel is at least
 NEAR = 3.0  # pixels of disparity: a plane farther off is another surface
 ROUNDS = 2
 STEADY = 2.5  # square pixels that are added to the spread of a neighbourhood: few pixels have no slope
+BAND = 64  # lines that are walked side by side
 
 # what is summed over the neighbours of a pixel: their weights, also times their distances from it along the lines (A)
 # and across them (B), and times their disparities
 ONE, D, AB, A, AA, AD, B, BB, BD = range(9)
+PARTS = 9
+TURNED = (ONE, D, AB, B, BB, BD, A, AA, AD)  # the same with the other lines: what was along is across
 
 
 @helper
-def _carry(before, weight, step, out):  # type: ignore[no-untyped-def]
-    """out += weight * the sums of the pixel before, as seen from here: distances along the line are a `step` less."""
-    out[ONE] += weight * before[ONE]
-    out[D] += weight * before[D]
-    out[AB] += weight * (before[AB] - step * before[B])
-    out[A] += weight * (before[A] - step * before[ONE])
-    out[AA] += weight * (before[AA] - step * (before[A] + before[A]) + before[ONE])
-    out[AD] += weight * (before[AD] - step * before[D])
-    out[B] += weight * before[B]
-    out[BB] += weight * before[BB]
-    out[BD] += weight * before[BD]
+def _carry(own, before, weight, out):  # type: ignore[no-untyped-def]
+    """out = own + weight * the sums of the pixels before."""
+    for x in range(out.size):
+        out[x] = own[x] + weight[x] * before[x]
 
 
-@kernel
-def along_paths(sums, links, out):  # type: ignore[no-untyped-def]
+@helper
+def _carry_along(own, before, lower, weight, step, out):  # type: ignore[no-untyped-def]
+    """The same with distances, which are a `step` less from here; `lower` has one of them less in its product."""
+    for x in range(out.size):
+        out[x] = own[x] + weight[x] * (before[x] - step * lower[x])
+
+
+@helper
+def _carry_square(own, before, lower, ones, weight, step, out):  # type: ignore[no-untyped-def]
+    """The same with squares of distances."""
+    for x in range(out.size):
+        out[x] = own[x] + weight[x] * (before[x] - step * (lower[x] + lower[x]) + ones[x])
+
+
+@helper
+def _carry_all(own, before, weight, step, out):  # type: ignore[no-untyped-def]
+    """out = own + weight * all sums of the pixels before, as seen from here."""
+    for c in (ONE, D, B, BB, BD):
+        _carry(own[c], before[c], weight, out[c])
+    for c, lower in ((AB, B), (A, ONE), (AD, D)):
+        _carry_along(own[c], before[c], before[lower], weight, step, out[c])
+    _carry_square(own[AA], before[AA], before[A], before[ONE], weight, step, out[AA])
+
+
+@helper
+def _copy(values, row):  # type: ignore[no-untyped-def]
+    for x in range(row.size):
+        row[x] = values[x]
+
+
+@helper
+def _add_others(all_after, own, row):  # type: ignore[no-untyped-def]
+    """row += all_after - own: what the pixel itself adds is in the row already."""
+    for x in range(row.size):
+        row[x] += all_after[x] - own[x]
+
+
+@helper
+def _walk(sums, links, behind, out):  # type: ignore[no-untyped-def]
     """out = the sums of all pixels of a line, each by the product of the links between it and the pixel.
 
     Parameters
     ----------
     sums
-        (pixels of a line, lines, 9) float32 in the order of the constants above, each as seen from its own pixel.
+        (pixels of a line, 9, lines) float32 in the order of the constants above, each as seen from its own pixel.
     links
         (pixels of a line, lines) float32 weight of the step from the pixel before.
+    behind
+        (2, 9, lines) for the sums of a pixel and those after it.
     """
-    pixels, lines, count = sums.shape
-    step = np.float32(1)
-    behind, carried = np.zeros((lines, count), np.float32), np.zeros(count, np.float32)
-    for p in range(pixels):
-        for line in range(lines):
-            for c in range(count):
-                out[p, line, c] = sums[p, line, c]
-            if p > 0:
-                _carry(out[p - 1, line], links[p, line], step, out[p, line])
-    for p in range(pixels - 1, -1, -1):
-        for line in range(lines):
-            for c in range(count):
-                carried[c] = np.float32(0)
-            if p < pixels - 1:
-                _carry(behind[line], links[p + 1, line], -step, carried)
-            for c in range(count):
-                out[p, line, c] += carried[c]
-                behind[line, c] = sums[p, line, c] + carried[c]
+    pixels, step = sums.shape[0], np.float32(1)
+    for c in range(PARTS):
+        _copy(sums[0, c], out[0, c])
+        _copy(sums[pixels - 1, c], behind[(pixels - 1) % 2, c])
+    for p in range(1, pixels):
+        _carry_all(sums[p], out[p - 1], links[p], step, out[p])
+    for p in range(pixels - 2, -1, -1):
+        _carry_all(sums[p], behind[(p + 1) % 2], links[p + 1], -step, behind[p % 2])
+        for c in range(PARTS):
+            _add_others(behind[p % 2, c], sums[p, c], out[p, c])
 
 
 @kernel
-def turn(sums, out):  # type: ignore[no-untyped-def]
-    """out (W, H, 9) = sums (H, W, 9) with the other lines: what was along is across."""
-    for row in range(sums.shape[0]):
-        for column in range(sums.shape[1]):
-            part, turned = sums[row, column], out[column, row]
-            for c in range(A):
-                turned[c] = part[c]
-            for c in range(3):
-                turned[A + c] = part[B + c]
-                turned[B + c] = part[A + c]
+def along_columns(sums, links):  # type: ignore[no-untyped-def]
+    """Sums along columns take the place of `sums` (H, 9, W), each as seen from its own pixel; `links` are (H, W)."""
+    height, _, width = sums.shape
+    summed, behind = np.empty((height, PARTS, BAND), np.float32), np.empty((2, PARTS, BAND), np.float32)
+    for left in range(0, width, BAND):
+        lines = slice(left, min(left + BAND, width))
+        count = lines.stop - left
+        _walk(sums[:, :, lines], links[:, lines], behind[:, :, :count], summed[:, :, :count])
+        for row in range(height):
+            for c in range(PARTS):
+                _copy(summed[row, c, :count], sums[row, c, lines])
+
+
+@kernel
+def along_rows(sums, links):  # type: ignore[no-untyped-def]
+    """The same along the rows, some of which are turned into columns at a time; `links` are (W, H)."""
+    height, _, width = sums.shape
+    turned, summed = np.empty((width, PARTS, BAND), np.float32), np.empty((width, PARTS, BAND), np.float32)
+    behind = np.empty((2, PARTS, BAND), np.float32)
+    for top in range(0, height, BAND):
+        count = min(BAND, height - top)
+        for c in range(PARTS):
+            for x in range(width):
+                for line in range(count):
+                    turned[x, TURNED[c], line] = sums[top + line, c, x]
+        _walk(turned[:, :, :count], links[:, top : top + count], behind[:, :, :count], summed[:, :, :count])
+        for c in range(PARTS):
+            for line in range(count):
+                for x in range(width):
+                    sums[top + line, c, x] = summed[x, TURNED[c], line]
+
+
+@helper
+def _planes_of(one, d, ab, a, aa, ad, b, bb, bd, out):  # type: ignore[no-untyped-def]
+    steady = np.float32(STEADY)
+    for x in range(out.size):
+        a_, b_, d_ = a[x] / one[x], b[x] / one[x], d[x] / one[x]
+        aa_, bb_ = aa[x] / one[x] - a_ * a_ + steady, bb[x] / one[x] - b_ * b_ + steady
+        ab_, ad_, bd_ = ab[x] / one[x] - a_ * b_, ad[x] / one[x] - a_ * d_, bd[x] / one[x] - b_ * d_
+        slopes = (ad_ * bb_ - bd_ * ab_) * a_ + (bd_ * aa_ - ad_ * ab_) * b_
+        out[x] = d_ - slopes / (aa_ * bb_ - ab_ * ab_)
 
 
 @kernel
 def planes_at(sums, out):  # type: ignore[no-untyped-def]
     """out (H, W) = what the plane of least weighted squares through the neighbours of a pixel says of the pixel."""
-    steady = np.float32(STEADY)
     for row in range(out.shape[0]):
-        for column in range(out.shape[1]):
-            part = sums[row, column]
-            a, b, d = part[A] / part[ONE], part[B] / part[ONE], part[D] / part[ONE]
-            aa, bb = part[AA] / part[ONE] - a * a + steady, part[BB] / part[ONE] - b * b + steady
-            ab, ad, bd = part[AB] / part[ONE] - a * b, part[AD] / part[ONE] - a * d, part[BD] / part[ONE] - b * d
-            slopes = (ad * bb - bd * ab) * a + (bd * aa - ad * ab) * b
-            out[row, column] = d - slopes / (aa * bb - ab * ab)
+        s = sums[row]
+        _planes_of(s[ONE], s[D], s[AB], s[A], s[AA], s[AD], s[B], s[BB], s[BD], out[row])
 
 
-def _links(lines: NDArray[np.uint8], found: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(pixels, lines) weight of a step from the pixel before: exp(-|dI| / COLOUR), and less across a jump."""
-    links = np.zeros(found.shape, np.float32)
-    contrast = np.abs(np.diff(lines.astype(np.int16), axis=0)).max(axis=-1)
-    links[1:] = np.exp(-np.arange(256) / COLOUR).astype(np.float32)[contrast]
-    links[1:][np.abs(np.diff(found, axis=0)) > JUMP] *= np.float32(ACROSS)
-    return links
+@helper
+def _link(image, found, fall, y, x, v, u):  # type: ignore[no-untyped-def]
+    """The weight of a step between two pixels."""
+    contrast = np.int64(0)
+    for c in range(image.shape[2]):
+        contrast = max(contrast, abs(np.int64(image[y, x, c]) - np.int64(image[v, u, c])))
+    near = abs(found[y, x] - found[v, u]) <= np.float32(JUMP)
+    return fall[contrast] * (np.float32(1) if near else np.float32(ACROSS))
+
+
+@kernel
+def link(image, found, fall, along, down):  # type: ignore[no-untyped-def]
+    """Weight of a step from the pixel before: in a row (`along`, (W, H)), and in a column (`down`, (H, W)).
+
+    `fall` has the weights by contrast, the largest difference over the colours; a jump makes them less.
+    """
+    height, width = found.shape
+    for y in range(height):
+        for x in range(width):
+            along[x, y] = _link(image, found, fall, y, x, y, x - 1) if x > 0 else np.float32(0)
+            down[y, x] = _link(image, found, fall, y, x, y - 1, x) if y > 0 else np.float32(0)
 
 
 def fitted(found: NDArray[np.float32], sure: NDArray[np.float32], image: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -116,16 +182,14 @@ def fitted(found: NDArray[np.float32], sure: NDArray[np.float32], image: NDArray
     image
         (H, W, 3) uint8.
     """
-    along, down = _links(image.swapaxes(0, 1), found.T), _links(image, found)
-    sums, summed = np.zeros((*found.shape, 9), np.float32), np.empty((*found.shape, 9), np.float32)
-    rows, rows_summed = (np.empty((*found.T.shape, 9), np.float32) for _ in range(2))
-    sums[..., ONE], sums[..., D] = sure, sure * found
+    along, down = np.empty(found.T.shape, np.float32), np.empty(found.shape, np.float32)
+    link(image, found, np.exp(-np.arange(256) / COLOUR).astype(np.float32), along, down)
+    sums = np.zeros((len(found), PARTS, found.shape[1]), np.float32)
+    sums[:, ONE], sums[:, D] = sure, sure * found
     for number in range(ROUNDS):
         length = np.float32(np.exp(-(2**number) / REACH))
-        turn(sums, rows)
-        along_paths(rows, along * length, rows_summed)
-        turn(rows_summed, summed)
-        along_paths(summed, down * length, sums)
+        along_rows(sums, along * length)
+        along_columns(sums, down * length)
     plane = np.empty_like(found)
     planes_at(sums, plane)
     return plane

@@ -101,7 +101,9 @@ def test_vote_is_a_weighted_median(shape, step, share, seed):
     for top, end in ((0, 1), (1, len(found))):
         least = np.float32(np.nanmin(found))
         places = classify(found, trusted, least, np.float32(step))
-        vote(found, images[0], asked, places, colour, distance, least, np.float32(step), top, end, out)
+        vote(
+            found, images[0], asked, places, colour, distance, least, np.nanmax(found), np.float32(step), top, end, out
+        )
     expected, even = voted(found, images[0], asked, trusted, step)
     np.testing.assert_allclose(out[~even], expected[~even], atol=1e-5)
 

@@ -39,7 +39,7 @@ def slow(images: NDArray[np.uint8], fineness: int) -> NDArray[np.float64]:
     return out
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(1, 3), st.integers(1, 7), st.integers(1, 5), st.integers(0, 99))
 def test_agrees_with_the_explicit_kernel(height: int, width: int, fineness: int, seed: int) -> None:
     images = np.random.default_rng(seed).integers(0, 256, (2, height, width, 3), dtype=np.uint8)
