@@ -62,6 +62,10 @@ def test_slow_downs_can_still_be_planted() -> None:
 def test_a_planted_slow_down_is_caught_and_unchanged_code_is_not(tmp_path: Path) -> None:
     """The short version of tests/benchmarks/prove.py, with a slow-down that no noise comes near."""
     code = prove.copy_checkout(tmp_path / "code")
+    in_turns = code / "matbench" / "bench" / "base.py"
+    text = in_turns.read_text(encoding="utf-8")
+    assert text.count("PAIRS = 4\n") == 1
+    in_turns.write_text(text.replace("PAIRS = 4\n", "PAIRS = 2\n"), encoding="utf-8")
     chosen = ("--only", "voxel pooling", "--rounds", "9", "--margin", "0.4")
     judged = ("--no-work", "--json")
 
