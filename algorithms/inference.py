@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from matbench.algorithms.agreement import agreement
 from matbench.algorithms.fusion import Fusion, charge
 from matbench.algorithms.mending import mend
+from matbench.algorithms.outlines import outlined
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.room import Room
 from matbench.algorithms.semiglobal import SemiGlobal
@@ -28,7 +29,7 @@ class Inference:
         its colour (`mend`). 0 = no mending.
     surfaces
         Whether unsure pixels take the disparities of the surfaces that surer pixels of their colour lie on
-        (`surfaces.smoothed`).
+        (`surfaces.smoothed`), and near surfaces end where less than half of a pixel is theirs (`outlines.outlined`).
     """
 
     fusion: Fusion = field(factory=Fusion)
@@ -101,7 +102,7 @@ class Inference:
 
         found, sure, energies = self._maps(matcher, cost, threads, ratios, maps)
         if self.surfaces:
-            found = np.where(sure > 0, self._on_surfaces(matcher, found, sure, threads), found)
+            found = self._on_surfaces(matcher, found, sure, threads, mended=False)
         before, after = energies.mean(axis=0)
         return found, float(before), float(after)
 
@@ -143,14 +144,19 @@ class Inference:
 
     @staticmethod
     def _on_surfaces(
-        matcher: Matcher, maps: NDArray[np.float32], sure: NDArray[np.float32], threads: int
+        matcher: Matcher, maps: NDArray[np.float32], sure: NDArray[np.float32], threads: int, mended: bool = True
     ) -> NDArray[np.float32]:
-        """(views, H, W) the maps `smoothed` in pixels of the field's pair."""
+        """(views, H, W) the maps `smoothed` and `outlined` in pixels of the field's pair.
+
+        Unless they are to be smoothed, too, `mended` pixels, which are not sure at all, are only outlined.
+        """
         scene, out = matcher.scene, np.empty_like(maps)
         pixels = np.float32(scene.pair_steps / matcher.space.fineness)
 
-        def smooth(view: int, _: int) -> None:
-            out[view] = smoothed(maps[view] * pixels, sure[view], scene.views[view]) / pixels
+        def shape(view: int, _: int) -> None:
+            found, image = maps[view] * pixels, scene.views[view]
+            smooth = smoothed(found, sure[view], image)
+            out[view] = outlined(smooth if mended else np.where(sure[view] > 0, smooth, found), image) / pixels
 
-        over_rows(smooth, len(maps), threads, 1)
+        over_rows(shape, len(maps), threads, 1)
         return out

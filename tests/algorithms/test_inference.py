@@ -6,6 +6,7 @@ import pytest
 from matbench.algorithms.fusion import Fusion
 from matbench.algorithms.inference import Inference
 from matbench.algorithms.mending import mend
+from matbench.algorithms.outlines import outlined
 from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import Matcher, Matching
 from matbench.algorithms.surfaces import smoothed
@@ -86,6 +87,8 @@ def test_unsure_pixels_of_the_first_maps_lie_on_the_surfaces_of_surer_ones():
     rough, sure = Inference(surfaces=False), np.empty((space.rows, space.width), np.float32)
     for view in range(scene.n):
         one = matcher.with_reference(view)
-        expected = smoothed(rough.initial_maps(one, 1, sure)[view] * pixels, sure, scene.views[view]) / pixels
+        image = scene.views[view]
+        smooth = smoothed(rough.initial_maps(one, 1, sure)[view] * pixels, sure, image)
+        expected = outlined(smooth, image) / pixels
         for threads in (1, 2):
             np.testing.assert_array_equal(Inference().initial_maps(matcher, threads)[view], expected)
