@@ -28,7 +28,6 @@ SCALE = {
     "shared": 1.0,
     "mccnn": 1.0,
 }  # what a dissimilarity counts at most: grey levels, and all of it
-MANY = 1 << 30  # more than there are planes
 OWN = {"published": 2.0, "shared": 0.05, "mccnn": 0.05}  # smoothness
 
 
@@ -41,11 +40,13 @@ class Niquin:
     + sum over the neighbours p, q of each view of w_pq min(|f_p - f_q|, step)
 
     that expansion moves find, among the maps in which no view sees through a surface of the view beside it. The match
-    of a pixel is its homologues in all views. Of these, a view sees the point if its own map is not nearer there; the
-    others, and those that do not hold the point, are `hidden` in number. Delta is the mean dissimilarity of
-    consecutive views that both see it. Who sees what follows from the maps of the pass before; at first, nothing is
-    hidden. A pass offers every plane once to all pixels of all views. After the first, one counts only if E, with what
-    its own maps hide, falls. The history holds E per pixel after each pass that counts.
+    of a pixel is its homologues in all views. Of these, a view sees the point unless its own map is nearer there by
+    more than one plane, so that slanted surfaces do not hide themselves; the others, and those that do not hold the
+    point, are `hidden` in number. Delta is the mean dissimilarity of consecutive views that both see it. Who sees what
+    follows from the maps of the pass before, at first none: nothing is hidden then. The plane that a pixel has would
+    give way if it took another one: farther planes are hidden by what hides that one alone. A pass offers every plane
+    once to all pixels of all views. After the first, one counts only if E, with what its own maps hide, falls. The
+    history holds E per pixel after each pass that counts.
 
     The consistency of all views' maps, and that dissimilarity and occlusion are rated together, is the source's; the
     formulas are reconstructed. See docs/concepts/graph-cuts.md.
@@ -77,7 +78,7 @@ class Niquin:
     occlusion: float = field(default=0.2, validator=[validators.ge(0), validators.le(10)])
     prices: Smoothness = field(factory=Smoothness)
     step: int = field(default=2, validator=validators.ge(1))
-    moves: Moves = field(factory=Moves)
+    moves: Moves = field(factory=partial(Moves, rounds=1))
 
     @property
     def silent(self) -> Mapping[str, str]:
@@ -167,7 +168,7 @@ def rate_matches(labels, differences, shifts, hidden, limit, top, end, out):  # 
                     before[x], seeing[x], compared[x], total[x] = 0, 0, 0, 0
                 for j in range(views):
                     shift = shifts[i, j, k]
-                    _see(labels[y, j], shift, MANY if j == i else k, sees)
+                    _see(labels[y, j], shift, k, labels[y, i], sees)
                     for x in range(width):
                         seeing[x] += sees[x]
                     if j > 0:
@@ -182,16 +183,16 @@ def rate_matches(labels, differences, shifts, hidden, limit, top, end, out):  # 
 
 
 @helper
-def _see(labels, shift, k, sees):  # type: ignore[no-untyped-def]
-    """sees <- is a pixel's homologue in the picture, and its label at most k?"""
+def _see(labels, shift, k, own, sees):  # type: ignore[no-untyped-def]
+    """sees <- is a homologue in the picture, and its label at most k or the pixel's own, or one more?"""
     width = sees.size
     low, high = min(max(-shift, 0), width), max(min(width - shift, width), 0)
     for x in range(width):
         sees[x] = 0
     if low < high:  # slices, so that nothing but what is added up depends on where they begin
-        there, here = labels[low + shift : high + shift], sees[low:high]
+        there, mine, here = labels[low + shift : high + shift], own[low:high], sees[low:high]
         for x in range(here.size):
-            here[x] = there[x] <= k
+            here[x] = there[x] <= max(k, mine[x]) + 1
 
 
 @helper
