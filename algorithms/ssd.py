@@ -23,16 +23,21 @@ class SSD(OnGrid):
 
     With the defaults this is SSD+MF ("min-filter") of Scharstein & Szeliski: squared differences, the mean over
     windows of 21x21 pixels, and the least such mean among the windows that contain the pixel (`Costs`). Published
-    for two views; of more, each point takes those that fit it best. The equiangular fit places the answer
-    between planes.
+    for two views; of more, each point takes those that fit it best.
 
     Source: D. Scharstein, R. Szeliski, "A taxonomy and evaluation of dense two-frame stereo correspondence
     algorithms", IJCV 47, 2002.
+
+    Parameters
+    ----------
+    fit
+        Place answers between planes, by the equiangular fit. As published they are whole planes.
     """
 
     by_default: ClassVar[bool] = False
 
     costs: Costs = field(factory=partial(Costs, difference="squared", window=21, shiftable=True))
+    fit: bool = False
 
     @property
     def silent(self) -> Mapping[str, str]:
@@ -45,4 +50,7 @@ class SSD(OnGrid):
         cost = np.ascontiguousarray(sweep.cost(context.threads).transpose(0, 2, 1))
         found = winner(cost, cost)
         sure = {scene.ref: peak_ratio(cost, found, context.threads)}
-        return Estimate({scene.ref: sweep.disparity(found)}, work=sweep.work, confidence=sure)
+        answer = (
+            found if self.fit else np.ceil(found - np.float32(0.5))
+        )  # a fraction of a half is a tie: the farther plane
+        return Estimate({scene.ref: sweep.disparity(answer)}, work=sweep.work, confidence=sure)

@@ -17,8 +17,17 @@ def test_it_is_the_plane_of_least_cost() -> None:
     estimate = method.solve(scene, Context())
     sweep = Sweep.of(scene, method.costs)
     nearest = sweep.disparity(sweep.cost().argmin(axis=2).astype(np.float32))
-    assert np.abs(estimate.disparity[scene.ref] - nearest).max() <= 0.5 / sweep.space.fineness + 1e-6
+    np.testing.assert_array_equal(estimate.disparity[scene.ref], nearest)
     assert estimate.work == sweep.work
+
+
+def test_a_fit_moves_answers_by_half_a_plane_at_most() -> None:
+    scene = load_scene("synthetic/slanted[size=48x36 n=3]")
+    whole, between = (
+        SSD(window=5, fit=fit, fineness=1).solve(scene, Context()).disparity[scene.ref] for fit in (False, True)
+    )
+    moved = np.abs(between - whole)
+    assert 0 < moved.max() <= 0.5 + 1e-6
 
 
 def test_defaults_are_those_of_the_published_row() -> None:
