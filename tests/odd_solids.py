@@ -1,6 +1,8 @@
-"""Surfaces of every kind of random worlds, somewhere in front of the cameras."""
+"""Surfaces of every kind of random worlds, somewhere in front of the cameras, and rays that meet them."""
 
-from matbench.datasets.synthetic import solids
+import numpy as np
+
+from matbench.datasets.synthetic import casting, solids
 from matbench.datasets.synthetic.dice import Dice
 from matbench.datasets.synthetic.solids import Skin, Solid, flat, round_
 
@@ -24,3 +26,15 @@ def solid(kind: int, dice: Dice) -> Solid:
 
 
 KINDS = [*range(solids.PLANE), solids.BALL, solids.HOLLOW, solids.TUBE, solids.CONE]
+
+
+@casting.exact
+def hits(kind, row, eye, rights, down, begin, count):  # type: ignore[no-untyped-def]
+    work = np.empty(3 * casting.ROOM)
+    casting.hits(kind, row, eye, rights, down, begin, count, work)
+    return work[:count]
+
+
+def hit(kind: int, row: np.ndarray, eye: float, right: float, down: float) -> float:
+    """The depth at which one ray meets a surface."""
+    return float(hits(kind, row, eye, np.array([right]), down, 0, 1)[0])

@@ -38,6 +38,10 @@ class Cameras(Protocol):
         """(H, W, 3) RGB grey levels, `highlight` of them where a surface reflects the light to the camera."""
         ...
 
+    def pictures(self, view: int, highlight: float) -> NDArray[np.float32]:
+        """(2, H, W, 3) RGB grey levels, first without the highlight and then with it (`picture`)."""
+        ...
+
 
 @frozen(eq=False)
 class Asked:

@@ -99,7 +99,8 @@ def exposed(
     if strengths.bias:
         grey = grey + strengths.bias * shares(seed, _BIAS, cameras)[view]
     grey = grey + noise((seed, _NOISE, view), picture.shape, strengths.noise)
-    return np.clip(np.floor(grey + 0.5), 0, 255).astype(np.uint8)
+    grey += 0.5
+    return np.clip(np.floor(grey, out=grey), 0, 255, out=grey).astype(np.uint8)
 
 
 def _from_middle(height: int, width: int) -> NDArray[np.float64]:

@@ -1,5 +1,8 @@
 """Casting rays into a world of `solids`: the compiled loops.
 
+All rays of a row of pixels are tried on one surface after the other. Those that its window holds stand next to each
+other, and numbers of a ray stand `ROOM` places apart in one array, so that several rays are computed at a time.
+
 Only sums, products, quotients and square roots of float64 are computed, in the order in which they are written: these
 are rounded in the same way by every processor. Therefore a world is the same on every machine.
 """
@@ -20,12 +23,15 @@ _OPTIONS: dict[str, Any] = {
 }
 exact = njit(**_OPTIONS)
 """How a loop is compiled whose last bit matters: nothing is reordered, and every product is rounded on its own."""
+inner = njit(**(_OPTIONS | {"no_cpython_wrapper": True}))
+"""The same for one that only other loops call: without an entry from Python it compiles sooner."""
 
 BEHIND = 1e-7  # relative depth by which a point must lie behind another to be hidden by it
+ROOM = 512  # most rays that are tried at a time
 MARGIN = 1e-6  # slope by which a surface's window is widened: rounding must not cut off its edge
 
 
-@exact
+@inner
 def _spoke(row, a, b):  # type: ignore[no-untyped-def]
     """Radius of a blob in the direction (a, b), whose angle is told without trigonometry."""
     size = abs(a) + abs(b)
@@ -38,8 +44,8 @@ def _spoke(row, a, b):  # type: ignore[no-untyped-def]
     return row[12 + first % 16] * (1 - part) + row[12 + (first + 1) % 16] * part
 
 
-@exact
-def _inside(kind, row, a, b):  # type: ignore[no-untyped-def]
+@inner
+def inside(kind, row, a, b):  # type: ignore[no-untyped-def]
     """Does a flat surface's outline hold the place (a, b)?"""
     if kind == 6:
         return True
@@ -60,50 +66,87 @@ def _inside(kind, row, a, b):  # type: ignore[no-untyped-def]
     return row[12] <= a * a + b * b <= 1
 
 
-@exact
-def hit(kind, row, eye, right, down):  # type: ignore[no-untyped-def]
-    """Depth at which the ray (eye, 0, 0) + Z (right, down, 1) meets a surface; infinite if it does not."""
+@inner
+def _flat(kind, row, eye, rights, down, begin, count, work):  # type: ignore[no-untyped-def]
+    """Put the depths at which rays meet a flat surface into `work`; infinite where they do not."""
     ox, oy, oz = eye - row[0], -row[1], -row[2]
-    if kind < 10:
-        slope = row[3] * right + row[4] * down + row[5]
-        if slope == 0:
-            return np.inf
-        z = -(row[3] * ox + row[4] * oy + row[5] * oz) / slope
-        if not z > 0:
-            return np.inf
+    ahead = row[3] * ox + row[4] * oy + row[5] * oz
+    r3, level, r5 = row[3], row[4] * down, row[5]
+    r6, r7, r8, r9, r10, r11 = row[6], row[7], row[8], row[9], row[10], row[11]
+    for i in range(count):
+        right = rights[begin + i]
+        slope = r3 * right + level + r5
+        z = -ahead / slope
+        z = z if z > 0 and slope != 0 else np.inf
         x, y, far = ox + z * right, oy + z * down, oz + z
-        a = row[6] * x + row[7] * y + row[8] * far
-        b = row[9] * x + row[10] * y + row[11] * far
-        return z if _inside(kind, row, a, b) else np.inf
-    px, dx = row[3] * ox + row[4] * oy + row[5] * oz, row[3] * right + row[4] * down + row[5]
-    py, dy = row[6] * ox + row[7] * oy + row[8] * oz, row[6] * right + row[7] * down + row[8]
-    pz, dz = row[9] * ox + row[10] * oy + row[11] * oz, row[9] * right + row[10] * down + row[11]
-    if kind <= 11:
-        square, half, rest = dx * dx + dy * dy + dz * dz, px * dx + py * dy + pz * dz, px * px + py * py + pz * pz - 1
+        work[i] = z
+        work[i + ROOM] = r6 * x + r7 * y + r8 * far
+        work[i + 2 * ROOM] = r9 * x + r10 * y + r11 * far
+    if kind == 0:
+        for i in range(count):
+            a, b = abs(work[i + ROOM]), abs(work[i + 2 * ROOM])
+            work[i] = work[i] if a <= 1 and b <= 1 else np.inf
+    elif kind != 6:
+        for i in range(count):
+            if work[i] < np.inf and not inside(kind, row, work[i + ROOM], work[i + 2 * ROOM]):
+                work[i] = np.inf
+
+
+@inner
+def _round(kind, row, eye, rights, down, begin, count, work):  # type: ignore[no-untyped-def]
+    """Put the depths at which rays meet a curved surface into `work`; infinite where they do not."""
+    ox, oy, oz = eye - row[0], -row[1], -row[2]
+    r3, r4, r5, r6, r7, r8 = row[3], row[4] * down, row[5], row[6], row[7] * down, row[8]
+    r9, r10, r11, t = row[9], row[10] * down, row[11], row[12]
+    px = row[3] * ox + row[4] * oy + row[5] * oz
+    py = row[6] * ox + row[7] * oy + row[8] * oz
+    pz = row[9] * ox + row[10] * oy + row[11] * oz
+    closed = kind <= 11
+    wide = 1 + t * pz
+    whole, open_ = px * px + py * py + pz * pz - 1, px * px + py * py - wide * wide
+    for i in range(count):
+        right = rights[begin + i]
+        dx, dy, dz = r3 * right + r4 + r5, r6 * right + r7 + r8, r9 * right + r10 + r11
+        grows = t * dz
+        flat = dx * dx + dy * dy
+        across = px * dx + py * dy
+        square = flat + dz * dz if closed else flat - grows * grows
+        half = across + pz * dz if closed else across - wide * grows
+        rest = whole if closed else open_
+        under = half * half - square * rest
+        met = under > 0 and square != 0
+        root = np.sqrt(under if met else 1.0)
+        one, two = (-half - root) / square, (-half + root) / square
+        work[i] = (two if two < one else one) if met else -1.0
+        work[i + ROOM] = (one if two < one else two) if met else -1.0
+        work[i + 2 * ROOM] = dz
+    if closed:
+        other = ROOM if kind == 11 else 0
+        for i in range(count):
+            z = work[i + other]
+            work[i] = z if z > 0 else np.inf
     else:
-        t = row[12]
-        wide, grows = 1 + t * pz, t * dz
-        square, half = dx * dx + dy * dy - grows * grows, px * dx + py * dy - wide * grows
-        rest = px * px + py * py - wide * wide
-    under = half * half - square * rest
-    if under <= 0 or square == 0:
-        return np.inf
-    root = np.sqrt(under)
-    one, two = (-half - root) / square, (-half + root) / square
-    if two < one:
-        one, two = two, one
-    if kind == 10:
-        return one if one > 0 else np.inf
-    if kind == 11:
-        return two if two > 0 else np.inf
-    for z in (one, two):
-        along = pz + z * dz
-        if z > 0 and abs(along) <= 1 and 1 + row[12] * along > 0:
-            return z
-    return np.inf
+        for i in range(count):
+            one, two, dz = work[i], work[i + ROOM], work[i + 2 * ROOM]
+            a, b = pz + one * dz, pz + two * dz
+            first = one > 0 and abs(a) <= 1 and 1 + t * a > 0
+            second = two > 0 and abs(b) <= 1 and 1 + t * b > 0
+            work[i] = one if first else (two if second else np.inf)
 
 
-@exact
+@inner
+def hits(kind, row, eye, rights, down, begin, count, work):  # type: ignore[no-untyped-def]
+    """Depths at which rays (eye, 0, 0) + Z (right, down, 1) meet a surface, infinite for those that do not.
+
+    Rays ``begin .. begin + count - 1`` are tried, at most `ROOM`. Their depths go to the front of `work`, (3 `ROOM`,).
+    """
+    if kind < 10:
+        _flat(kind, row, eye, rights, down, begin, count, work)
+    else:
+        _round(kind, row, eye, rights, down, begin, count, work)
+
+
+@inner
 def candidates(windows, down, found):  # type: ignore[no-untyped-def]
     """Put the surfaces that a ray of that slope down can meet into `found`, nearest first; how many they are."""
     count = 0
@@ -114,31 +157,70 @@ def candidates(windows, down, found):  # type: ignore[no-untyped-def]
     return count
 
 
-@exact
-def first(kinds, rows, windows, found, count, eye, right, down):  # type: ignore[no-untyped-def]
-    """Depth of the nearest surface on a ray, and its number; infinite and -1 if there is none."""
-    nearest, number = np.inf, -1
+@inner
+def after(rights, count, limit):  # type: ignore[no-untyped-def]
+    """How many of ascending slopes do not exceed a limit."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if rights[middle] > limit:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@inner
+def before(rights, count, limit):  # type: ignore[no-untyped-def]
+    """How many of ascending slopes are below a limit."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if rights[middle] < limit:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@inner
+def cast(kinds, rows, windows, found, met, eye, rights, down, count, work, depth, index):  # type: ignore[no-untyped-def]
+    """Depth and number of the nearest surface on each ray of a row; infinite and -1 where there is none.
+
+    Parameters
+    ----------
+    found, met
+        The surfaces that the row can meet, nearest first, and how many they are.
+    rights, count
+        Slopes to the right, ascending, and how many they are.
+    work
+        (3 `ROOM`,) numbers on the way.
+    """
     for i in range(count):
-        k = found[i]
-        if windows[k, 4] > nearest:
-            break
-        if windows[k, 0] - MARGIN < right < windows[k, 1] + MARGIN:
-            z = hit(kinds[k], rows[k], eye, right, down)
-            if z < nearest:
-                nearest, number = z, k
-    return nearest, number
+        depth[i] = np.inf
+        index[i] = -1
+    for j in range(met):
+        k = found[j]
+        least = windows[k, 4]
+        begin, end = after(rights, count, windows[k, 0] - MARGIN), before(rights, count, windows[k, 1] + MARGIN)
+        while begin < end:
+            some = min(end - begin, ROOM)
+            hits(kinds[k], rows[k], eye, rights, down, begin, some, work)
+            for i in range(some):
+                # a surface that begins behind what is nearest so far is not before it, whatever rounding says
+                nearer = work[i] < depth[begin + i] and least <= depth[begin + i]
+                depth[begin + i] = work[i] if nearer else depth[begin + i]
+                index[begin + i] = k if nearer else index[begin + i]
+            begin += some
 
 
 @exact
 def depths(kinds, rows, windows, eye, rights, downs, depth, index):  # type: ignore[no-untyped-def]
     """Depth and number of the surface on each ray: `rights` are the slopes of the columns, `downs` of the rows."""
-    found = np.empty(kinds.size, np.int64)
+    found, work = np.empty(kinds.size, np.int64), np.empty(3 * ROOM)
     for y in range(downs.size):
-        count = candidates(windows, downs[y], found)
-        for x in range(rights.size):
-            z, k = first(kinds, rows, windows, found, count, eye, rights[x], downs[y])
-            depth[y, x] = z
-            index[y, x] = k
+        met = candidates(windows, downs[y], found)
+        cast(kinds, rows, windows, found, met, eye, rights, downs[y], rights.size, work, depth[y], index[y])
 
 
 @exact
@@ -159,24 +241,27 @@ def seen(kinds, rows, windows, eye, middle, focal, downs, top, places, depth, ou
         (H, W) their depth.
     """
     height, width = depth.shape
-    found = np.empty(kinds.size, np.int64)
+    found, work = np.empty(kinds.size, np.int64), np.empty(3 * ROOM)
+    rights, limits, tried = np.empty(width), np.empty(width), np.empty(width, np.bool_)
     for y in range(height):
-        row = y + top
-        level = -0.5 <= row < height - 0.5
-        count = candidates(windows, downs[y], found)
+        level = -0.5 <= y + top < height - 0.5
         for x in range(width):
-            place = places[y, x]
-            out[y, x] = False
-            if level and -0.5 <= place < width - 0.5:
-                right = (place - middle) / focal
-                limit = depth[y, x] * (1 - BEHIND)
-                clear = True
-                for i in range(count):
-                    k = found[i]
-                    if windows[k, 4] >= limit:
-                        break
-                    framed = windows[k, 0] - MARGIN < right < windows[k, 1] + MARGIN
-                    if framed and hit(kinds[k], rows[k], eye, right, downs[y]) < limit:
-                        clear = False
-                        break
-                out[y, x] = clear
+            rights[x] = (places[y, x] - middle) / focal
+            limits[x] = depth[y, x] * (1 - BEHIND)
+            out[y, x] = level and -0.5 <= places[y, x] < width - 0.5
+        met = candidates(windows, downs[y], found) if level else 0
+        for j in range(met):
+            k = found[j]
+            left, right, least = windows[k, 0] - MARGIN, windows[k, 1] + MARGIN, windows[k, 4]
+            begin, end = width, 0
+            for x in range(width):
+                tried[x] = out[y, x] and least < limits[x] and left < rights[x] and rights[x] < right
+                if tried[x]:
+                    begin, end = min(begin, x), x + 1
+            while begin < end:
+                some = min(end - begin, ROOM)
+                hits(kinds[k], rows[k], eye, rights, downs[y], begin, some, work)
+                for i in range(some):
+                    x = begin + i
+                    out[y, x] = out[y, x] and not (tried[x] and work[i] < limits[x])
+                begin += some

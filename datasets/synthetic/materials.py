@@ -13,7 +13,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from matbench.datasets.synthetic.casting import exact
+from matbench.datasets.synthetic.casting import exact, inner
 
 SIZE = 512
 """Texels that a tile is wide and high; it repeats."""
@@ -53,24 +53,8 @@ class Material:
     pitch: float = 16.0
     tint: float = 0.35
 
-    def row(self) -> NDArray[np.float64]:
-        return np.array(
-            [
-                self.leaves,
-                self.grain,
-                self.print_,
-                self.weave,
-                self.stripes,
-                self.least,
-                self.largest,
-                self.rough,
-                self.pitch,
-                self.tint,
-            ]
-        )
 
-
-@exact
+@inner
 def _next(state):  # type: ignore[no-untyped-def]
     """A share from 0 to below 1; the state moves on (splitmix64: Steele, Lea & Flood 2014)."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
@@ -81,7 +65,7 @@ def _next(state):  # type: ignore[no-untyped-def]
     return np.float64(z >> np.uint64(11)) / 9007199254740992.0
 
 
-@exact
+@inner
 def _normal(state):  # type: ignore[no-untyped-def]
     """Nearly normally distributed, deviation 1."""
     return (_next(state) + _next(state) + _next(state) - 1.5) * 2.0
@@ -262,30 +246,6 @@ def _level(part, weight, total):  # type: ignore[no-untyped-def]
 
 
 @exact
-def _tile(seed, material, total):  # type: ignore[no-untyped-def]
-    """The sum of a material's parts."""
-    part = np.zeros_like(total)
-    for number in range(5):
-        weight = material[number]
-        if weight == 0:
-            continue
-        state = np.empty(1, np.uint64)
-        state[0] = seed + np.uint64(number)
-        part[:] = 0
-        if number == 0:
-            _leaves(state, material[5], material[6], material[9], part)
-        elif number == 1:
-            _grain(state, material[7], material[9], part)
-        elif number == 2:
-            _print(state, material[8], part)
-        elif number == 3:
-            _weave(state, material[8], part)
-        else:
-            _stripes(state, material[8], material[9], part)
-        _level(part, weight, total)
-
-
-@exact
 def _shrink(atlas, starts, size):  # type: ignore[no-untyped-def]
     """Fill the coarser levels of a tile: means of 2 x 2 texels."""
     for level in range(1, starts.size - 1):
@@ -303,7 +263,19 @@ def _shrink(atlas, starts, size):  # type: ignore[no-untyped-def]
 def tile(seed: int, material: Material) -> NDArray[np.int8]:
     """(texels, 3) int8: a picture, mean 0, deviation `STEPS`, cut off at three deviations; then its coarser levels."""
     total, whole = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 3))
-    _tile(np.uint64(seed), material.row(), total)
+    made = (
+        (material.leaves, _leaves, (material.least, material.largest, material.tint)),
+        (material.grain, _grain, (material.rough, material.tint)),
+        (material.print_, _print, (material.pitch,)),
+        (material.weave, _weave, (material.pitch,)),
+        (material.stripes, _stripes, (material.pitch, material.tint)),
+    )
+    # one loop of all would be compiled once more for each of its parts
+    for number, (weight, make, numbers) in enumerate(made):
+        if weight:
+            part = np.zeros_like(total)
+            make(np.array([seed + number], np.uint64), *map(float, numbers), part)
+            _level(part, float(weight), total)
     _level(total, float(STEPS), whole)
     values = np.empty((int(STARTS[-1]), 3), np.float32)
     values[: SIZE * SIZE] = np.clip(whole, -3.0 * STEPS, 3.0 * STEPS).reshape(-1, 3)

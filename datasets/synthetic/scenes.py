@@ -45,6 +45,10 @@ class _Painted:
     def picture(self, view: int, highlight: float) -> NDArray[np.float32]:
         return evolve(self.rig, highlight=highlight).picture(view, self.marks)
 
+    def pictures(self, view: int, highlight: float) -> NDArray[np.float32]:
+        dull = self.picture(view, 0.0)
+        return np.stack([dull, self.picture(view, highlight) if highlight else dull])
+
 
 def _named(name: str, options: Mapping[str, str]) -> Asked:
     """One of the ten scenes with a name, as it was asked for."""
@@ -119,7 +123,7 @@ class Synthetic:
         searched = search_range(ask.called, options.get("disparities"), ask.pair_steps)
         cameras, strengths = ask.cameras, ask.strengths
 
-        reference = cameras.picture(ref, strengths.highlight)
+        dull, reference = cameras.pictures(ref, strengths.highlight)
 
         def look(view: int) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.bool_]]:
             sharp = reference if view == ref else cameras.picture(view, strengths.highlight)
@@ -133,7 +137,6 @@ class Synthetic:
             views[view] = picture
         _, truth, visible = found[ref]
         # regions come from this picture: the reference view without faults of the camera and without highlights
-        dull = cameras.picture(ref, 0.0) if strengths.highlight else reference
         undisturbed = exposed(dull, NOTHING, ask.seed, ref, ask.n)
         partner = ask.partner(ref)
         full = Scene(

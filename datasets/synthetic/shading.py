@@ -1,93 +1,183 @@
-"""Pictures of a world of `solids`: the compiled loop that gives each ray its colour."""
+"""Pictures of a world of `solids`: the compiled loops that give rays their colours.
+
+A row of a picture is made at a time: all its rays are cast, then shaded surface by surface.
+"""
 
 import numpy as np
 
-from matbench.datasets.synthetic.casting import MARGIN, candidates, exact, first, hit
+from matbench.datasets.synthetic.casting import MARGIN, candidates, cast, exact, inner
+from matbench.datasets.synthetic.materials import LEVELS
 
 RELIEF = 0.35
 """How far the pattern bends the normal of a glossy surface, for a deviation of its colours from grey."""
 
-
-@exact
-def _lookup(tile, starts, across, down, footprint, colour):  # type: ignore[no-untyped-def]
-    """Colour of a tile (period 1) at a place, averaged over about `footprint` texels; linear between texels."""
-    level = 0
-    while footprint > 1.4 and level < starts.size - 2:
-        footprint *= 0.5
-        level += 1
-    start, size = starts[level], 512 >> level
-    x, y = across * size - 0.5, down * size - 0.5
-    left, top = np.floor(x), np.floor(y)
-    u, v = x - left, y - top
-    i, j = int(left) & (size - 1), int(top) & (size - 1)
-    k, m = (i + 1) & (size - 1), (j + 1) & (size - 1)
-    a, b, e, f = start + j * size + i, start + j * size + k, start + m * size + i, start + m * size + k
-    one, two, three, four = (1 - u) * (1 - v) / 40, u * (1 - v) / 40, (1 - u) * v / 40, u * v / 40
-    for c in range(3):
-        colour[c] = tile[a, c] * one + tile[b, c] * two + tile[e, c] * three + tile[f, c] * four
+BATCH, NUMBERS = 256, 23
+"""Rays that are shaded at a time, and how many numbers each of them has. These stand `BATCH` apart in one array."""
 
 
-@exact
-def _colour(kind, row, skin, tiles, starts, eye, right, down, z, spacing, light, colour, grain):  # type: ignore[no-untyped-def]
-    """Colour of the point at depth z on a ray.
+@inner
+def _meet(kind, row, skin, eye, spacing, count, work):  # type: ignore[no-untyped-def]
+    """Where rays meet a surface, and how it is lit there.
 
-    Parameters
-    ----------
-    spacing
-        Between rays, as a difference of slopes.
-    light
-        Unit vector towards the light, the share of light from everywhere, and the highlight in grey levels.
+    Takes slopes to the right and down and depths, the first three numbers of each ray in `work`; puts from the fourth
+    on: place in the pattern (two), texels that a ray covers there, normal (three), distance.
     """
-    wx, wy, wz = eye + z * right, z * down, z
-    ox, oy, oz = wx - row[0], wy - row[1], wz - row[2]
-    px = row[3] * ox + row[4] * oy + row[5] * oz
-    py = row[6] * ox + row[7] * oy + row[8] * oz
-    pz = row[9] * ox + row[10] * oy + row[11] * oz
-    if kind < 10:
-        nx, ny, nz = row[3], row[4], row[5]
-        a = py / np.sqrt(row[6] * row[6] + row[7] * row[7] + row[8] * row[8])
-        b = pz / np.sqrt(row[9] * row[9] + row[10] * row[10] + row[11] * row[11])
-    else:
-        end = pz if kind <= 11 else -row[12] * (1 + row[12] * pz)
-        nx = px * row[3] + py * row[6] + end * row[9]
-        ny = px * row[4] + py * row[7] + end * row[10]
-        nz = px * row[5] + py * row[8] + end * row[11]
-        a, b = ox + 0.4 * oz, oy + 0.4 * oz
-    size = np.sqrt(nx * nx + ny * ny + nz * nz)
-    far = np.sqrt((wx - eye) * (wx - eye) + wy * wy + wz * wz)
-    facing = (nx * (wx - eye) + ny * wy + nz * wz) / (size * far)
-    if facing > 0:
-        nx, ny, nz = -nx, -ny, -nz
-    facing = max(abs(facing), 0.1)
-    nx, ny, nz = nx / size, ny / size, nz / size
-    u = skin[1] * a + skin[2] * b + skin[3]
-    v = skin[1] * b - skin[2] * a + skin[4]
-    # the footprint of a ray is longer than wide by 1 / facing: a square of the same area
-    texels = 512.0 * np.sqrt(skin[1] * skin[1] + skin[2] * skin[2]) * z * spacing / np.sqrt(facing)
-    _lookup(tiles[int(skin[0])], starts, u, v, texels, colour)
-    grey = (colour[0] + colour[1] + colour[2]) / 3
-    bend, lean = colour[0] - grey, colour[2] - grey
-    for c in range(3):
-        colour[c] = skin[8] * (grey + skin[12] * (colour[c] - grey))
-    if skin[10] > 0:
-        _lookup(tiles[0], starts, skin[11] * u, skin[11] * v, skin[11] * texels, grain)
+    x0, y0, z0 = row[0], row[1], row[2]
+    r3, r4, r5, r6, r7, r8, r9, r10, r11, taper = (
+        row[3],
+        row[4],
+        row[5],
+        row[6],
+        row[7],
+        row[8],
+        row[9],
+        row[10],
+        row[11],
+        row[12],
+    )
+    cosine, sine, left, top = skin[1], skin[2], skin[3], skin[4]
+    is_flat, is_closed = kind < 10, kind <= 11
+    wide, tall = np.sqrt(r6 * r6 + r7 * r7 + r8 * r8), np.sqrt(r9 * r9 + r10 * r10 + r11 * r11)
+    fine = 512.0 * np.sqrt(cosine * cosine + sine * sine)
+    for i in range(count):
+        right, down, z = work[i], work[i + BATCH], work[i + 2 * BATCH]
+        wx, wy = eye + z * right, z * down
+        ox, oy, oz = wx - x0, wy - y0, z - z0
+        px = r3 * ox + r4 * oy + r5 * oz
+        py = r6 * ox + r7 * oy + r8 * oz
+        pz = r9 * ox + r10 * oy + r11 * oz
+        end = pz if is_closed else -taper * (1 + taper * pz)
+        nx = r3 if is_flat else px * r3 + py * r6 + end * r9
+        ny = r4 if is_flat else px * r4 + py * r7 + end * r10
+        nz = r5 if is_flat else px * r5 + py * r8 + end * r11
+        a = py / wide if is_flat else ox + 0.4 * oz
+        b = pz / tall if is_flat else oy + 0.4 * oz
+        away = wx - eye
+        size = np.sqrt(nx * nx + ny * ny + nz * nz)
+        far = np.sqrt(away * away + wy * wy + z * z)
+        facing = (nx * away + ny * wy + nz * z) / (size * far)
+        nx, ny, nz = (-nx, -ny, -nz) if facing > 0 else (nx, ny, nz)
+        facing = max(abs(facing), 0.1)
+        work[i + 3 * BATCH] = cosine * a + sine * b + left
+        work[i + 4 * BATCH] = cosine * b - sine * a + top
+        # the footprint of a ray is longer than wide by 1 / facing: a square of the same area
+        work[i + 5 * BATCH] = fine * z * spacing / np.sqrt(facing)
+        work[i + 6 * BATCH] = nx / size
+        work[i + 7 * BATCH] = ny / size
+        work[i + 8 * BATCH] = nz / size
+        work[i + 9 * BATCH] = far
+
+
+@inner
+def _lookup(tile, starts, scale, count, work, colours):  # type: ignore[no-untyped-def]
+    """Colours of a tile (period 1) where rays meet it, averaged over what they cover; linear between texels.
+
+    They become the first three numbers of each ray in `colours`, a part of `work`.
+    """
+    for i in range(count):
+        footprint, size, level = scale * work[i + 5 * BATCH], 512.0, 0.0
+        for _ in range(LEVELS - 1):
+            is_wide = footprint > 1.4
+            footprint = footprint * 0.5 if is_wide else footprint
+            size = size * 0.5 if is_wide else size
+            level = level + 1 if is_wide else level
+        x, y = scale * work[i + 3 * BATCH] * size - 0.5, scale * work[i + 4 * BATCH] * size - 0.5
+        left, top = np.floor(x), np.floor(y)
+        u, v = x - left, y - top
+        work[i + 16 * BATCH] = (1 - u) * (1 - v) / 40
+        work[i + 17 * BATCH] = u * (1 - v) / 40
+        work[i + 18 * BATCH] = (1 - u) * v / 40
+        work[i + 19 * BATCH] = u * v / 40
+        work[i + 20 * BATCH] = left
+        work[i + 21 * BATCH] = top
+        work[i + 22 * BATCH] = level
+    for i in range(count):
+        level = int(work[i + 22 * BATCH])
+        start, size = starts[level], 512 >> level
+        i0, j0 = int(work[i + 20 * BATCH]) & (size - 1), int(work[i + 21 * BATCH]) & (size - 1)
+        above, below = start + j0 * size, start + ((j0 + 1) & (size - 1)) * size
+        i1 = (i0 + 1) & (size - 1)
+        one, two = work[i + 16 * BATCH], work[i + 17 * BATCH]
+        three, four = work[i + 18 * BATCH], work[i + 19 * BATCH]
         for c in range(3):
-            colour[c] += skin[10] * grain[c]
-    lit = light[3] + (1 - light[3]) * max(0.0, nx * light[0] + ny * light[1] + nz * light[2])
-    shine = 0.0
-    if light[4] * skin[9] > 0:
-        hx, hy, hz = light[0] - (wx - eye) / far, light[1] - wy / far, light[2] - wz / far
-        nx, ny = nx + RELIEF * bend, ny + RELIEF * lean
+            upper = tile[above + i0, c] * one + tile[above + i1, c] * two
+            colours[i + c * BATCH] = upper + tile[below + i0, c] * three + tile[below + i1, c] * four
+
+
+@inner
+def _shine(skin, eye, light, count, work):  # type: ignore[no-untyped-def]
+    """Put the highlights of rays in the place of the distances."""
+    gloss, polish = light[4] * skin[9], int(skin[13])
+    for i in range(count):
+        right, down, z, far = work[i], work[i + BATCH], work[i + 2 * BATCH], work[i + 9 * BATCH]
+        red, green, blue = work[i + 10 * BATCH], work[i + 11 * BATCH], work[i + 12 * BATCH]
+        grey = (red + green + blue) / 3
+        away, wy = eye + z * right - eye, z * down
+        hx, hy, hz = light[0] - away / far, light[1] - wy / far, light[2] - z / far
+        nx, ny = work[i + 6 * BATCH] + RELIEF * (red - grey), work[i + 7 * BATCH] + RELIEF * (blue - grey)
+        nz = work[i + 8 * BATCH]
         cosine = (nx * hx + ny * hy + nz * hz) / np.sqrt((hx * hx + hy * hy + hz * hz) * (nx * nx + ny * ny + nz * nz))
-        cosine = max(cosine, 0.0)
-        for _ in range(int(skin[13])):
-            cosine *= cosine
-        shine = light[4] * skin[9] * cosine
-    for c in range(3):
-        colour[c] = max((skin[5 + c] + colour[c]) * lit, 0.0) + shine
+        work[i + 9 * BATCH] = max(cosine, 0.0)
+    for _ in range(polish):
+        for i in range(count):
+            work[i + 9 * BATCH] *= work[i + 9 * BATCH]
+    for i in range(count):
+        work[i + 9 * BATCH] = gloss * work[i + 9 * BATCH]
 
 
-@exact
+@inner
+def _shade(kind, row, skin, tiles, starts, eye, spacing, light, count, work):  # type: ignore[no-untyped-def]
+    """Colours of rays at a surface: numbers 10 to 12 of `work` without the highlight, 13 to 15 with it."""
+    _meet(kind, row, skin, eye, spacing, count, work)
+    _lookup(tiles[int(skin[0])], starts, 1.0, count, work, work[10 * BATCH :])
+    rough = skin[10]
+    if rough > 0:
+        _lookup(tiles[0], starts, skin[11], count, work, work[13 * BATCH :])
+    is_glossy = light[4] * skin[9] > 0
+    if is_glossy:
+        _shine(skin, eye, light, count, work)
+    around, contrast, tint, red, green, blue = light[3], skin[8], skin[12], skin[5], skin[6], skin[7]
+    for i in range(count):
+        facing = work[i + 6 * BATCH] * light[0] + work[i + 7 * BATCH] * light[1] + work[i + 8 * BATCH] * light[2]
+        lit = around + (1 - around) * max(0.0, facing)
+        shine = work[i + 9 * BATCH] if is_glossy else 0.0
+        r, g, b = work[i + 10 * BATCH], work[i + 11 * BATCH], work[i + 12 * BATCH]
+        grey = (r + g + b) / 3
+        r, g, b = (
+            contrast * (grey + tint * (r - grey)),
+            contrast * (grey + tint * (g - grey)),
+            contrast * (grey + tint * (b - grey)),
+        )
+        if rough > 0:
+            r, g, b = (
+                r + rough * work[i + 13 * BATCH],
+                g + rough * work[i + 14 * BATCH],
+                b + rough * work[i + 15 * BATCH],
+            )
+        r, g, b = max((red + r) * lit, 0.0), max((green + g) * lit, 0.0), max((blue + b) * lit, 0.0)
+        work[i + 10 * BATCH], work[i + 11 * BATCH], work[i + 12 * BATCH] = r, g, b
+        work[i + 13 * BATCH], work[i + 14 * BATCH], work[i + 15 * BATCH] = r + shine, g + shine, b + shine
+
+
+@inner
+def _sides(windows, near, count, lefts, index, y, sides):  # type: ignore[no-untyped-def]
+    """How many rays across each pixel of a row gets: 4 where surfaces meet, else 2, or 1 where nothing else can."""
+    height, width = index.shape
+    for x in range(width):
+        sides[x] = 0
+    for i in range(count):
+        k = near[i]
+        least, most = windows[k, 0] - MARGIN, windows[k, 1] + MARGIN
+        for x in range(width):
+            sides[x] += least < lefts[x + 1] and most > lefts[x]
+    for x in range(width):
+        own = index[y, x]
+        alike = index[y, max(x - 1, 0)] == own and index[y, min(x + 1, width - 1)] == own
+        alike = alike and index[max(y - 1, 0), x] == own and index[min(y + 1, height - 1), x] == own
+        sides[x] = 1 if sides[x] < 2 else (2 if alike else 4)
+
+
+@inner
 def _around(windows, above, below, found):  # type: ignore[no-untyped-def]
     """Put the surfaces that rays between two slopes down can meet into `found`; how many they are."""
     count = 0
@@ -98,14 +188,43 @@ def _around(windows, above, below, found):  # type: ignore[no-untyped-def]
     return count
 
 
-@exact
-def _alone(windows, found, count, left, right):  # type: ignore[no-untyped-def]
-    """Can rays between two slopes to the right meet one of these surfaces at most?"""
-    met = 0
-    for i in range(count):
-        k = found[i]
-        met += windows[k, 0] - MARGIN < right and windows[k, 1] + MARGIN > left
-    return met < 2
+@inner
+def _shade_row(kinds, rows, skins, tiles, starts, eye, spacing, light, total, rays, met, places, work, colours):  # type: ignore[no-untyped-def]
+    """Shade all rays of a row, surface by surface; those that meet nothing stay black.
+
+    Parameters
+    ----------
+    total, rays, met
+        How many rays; (3, rays) their slopes to the right and down and their depths; the surface that each of them
+        meets, -1 if there is none.
+    places
+        (rays,) numbers on the way.
+    colours
+        (rays, 6) without the highlight, and with it.
+    """
+    used = np.zeros(kinds.size, np.bool_)
+    for i in range(total):
+        if met[i] >= 0:
+            used[met[i]] = True
+        else:
+            for c in range(6):
+                colours[i, c] = 0.0
+    for k in range(kinds.size):
+        count = 0
+        if used[k]:
+            for i in range(total):
+                if met[i] == k:
+                    places[count] = i
+                    count += 1
+        for begin in range(0, count, BATCH):
+            some = min(count - begin, BATCH)
+            for j in range(some):
+                for c in range(3):
+                    work[j + c * BATCH] = rays[c, places[begin + j]]
+            _shade(kinds[k], rows[k], skins[k], tiles, starts, eye, spacing, light, some, work)
+            for j in range(some):
+                for c in range(6):
+                    colours[places[begin + j], c] = work[j + (10 + c) * BATCH]
 
 
 @exact
@@ -116,74 +235,55 @@ def picture(kinds, rows, windows, skins, tiles, starts, eye, middle, focal, top,
     ----------
     middle, top, focal
         Column and row of the optical axis, and the focal length, px.
+    light
+        Unit vector towards the light, the share of light from everywhere, and the highlight in grey levels.
     index
         (H, W) the surface at every pixel's centre.
     out
-        (H, W, 3) float32.
+        (2, H, W, 3) float32: without the highlight, and with it.
     """
     height, width = index.shape
-    found = np.empty((6, kinds.size), np.int64)
-    around = np.empty(kinds.size, np.int64)
-    counts = np.empty(6, np.int64)
-    downs = np.empty(6)
-    colour, grain, total = np.empty(3), np.empty(3), np.empty(3)
+    most = 20 * width  # rays of a row: two rows of two a pixel, four of four
+    found, sides, lefts = np.empty(kinds.size, np.int64), np.empty(width, np.int64), np.empty(width + 1)
+    rays, met, places, colours = (
+        np.empty((3, most)),
+        np.empty(most, np.int64),
+        np.empty(most, np.int64),
+        np.empty((most, 6)),
+    )
+    firsts = np.empty((6, width), np.int64)  # where the rays of a pixel begin
+    work = np.empty(NUMBERS * BATCH)
+    for x in range(width + 1):
+        lefts[x] = (x - 0.5 - middle) / focal
     for y in range(height):
+        near = _around(windows, (y - 0.5 - top) / focal, (y + 0.5 - top) / focal, found)
+        _sides(windows, found, near, lefts, index, y, sides)
+        total = np.int64(0)  # not a literal: numba would compile what it is given to once more
         for s in range(6):
-            shift = (s - 0.5) * 0.5 if s < 2 else (s - 3.5) * 0.25
-            downs[s] = (y + shift - top) / focal
-            counts[s] = candidates(windows, downs[s], found[s])
-        near = _around(windows, (y - 0.5 - top) / focal, (y + 0.5 - top) / focal, around)
+            begin, down = total, (y + ((s - 0.5) * 0.5 if s < 2 else (s - 3.5) * 0.25) - top) / focal
+            for x in range(width):
+                firsts[s, x], side = total, sides[x]
+                if (side == 4) != (s >= 2):
+                    continue
+                for t in range(side):
+                    shift = (t - 1.5) * 0.25 if side == 4 else (t + s * (2 - side) - 0.5) * 0.5
+                    rays[0, total], rays[1, total] = (x + shift - middle) / focal, down
+                    total += 1
+            held, rights, depths = candidates(windows, down, found), rays[0, begin:total], rays[2, begin:total]
+            cast(kinds, rows, windows, found, held, eye, rights, down, total - begin, work, depths, met[begin:total])
+            if s == 1:  # where a ray meets something else after all, the pixel is not alike
+                for x in range(width):
+                    own, i, j = index[y, x], firsts[0, x], firsts[1, x]
+                    if sides[x] == 2 and not (met[i] == met[i + 1] == met[j] == met[j + 1] == own):
+                        sides[x] = 4
+                        met[i] = met[i + 1] = met[j] = met[j + 1] = -1
+        _shade_row(kinds, rows, skins, tiles, starts, eye, 0.5 / focal, light, total, rays, met, places, work, colours)
         for x in range(width):
-            own = index[y, x]
-            alone = _alone(windows, around, near, (x - 0.5 - middle) / focal, (x + 0.5 - middle) / focal)
-            alike = True
-            if x > 0:
-                alike = alike and index[y, x - 1] == own
-            if x < width - 1:
-                alike = alike and index[y, x + 1] == own
-            if y > 0:
-                alike = alike and index[y - 1, x] == own
-            if y < height - 1:
-                alike = alike and index[y + 1, x] == own
-            if alone:  # two rays do, on a diagonal
-                side = 1
-            elif alike:
-                side = 2
-            else:
-                side = 4
-            while True:
-                for c in range(3):
-                    total[c] = 0.0
-                same, begin, count = True, (2 if side == 4 else 0), max(side, 2)
-                for s in range(begin, begin + count):
+            side = sides[x]
+            first, last = (2, 6) if side == 4 else (0, 2)
+            for c in range(6):
+                sum_ = 0.0
+                for s in range(first, last):
                     for t in range(side):
-                        shift = (t - 1.5) * 0.25 if side == 4 else (t + s * (2 - side) - 0.5) * 0.5
-                        right = (x + shift - middle) / focal
-                        if alone:
-                            z, k = hit(kinds[own], rows[own], eye, right, downs[s]), own
-                        else:
-                            z, k = first(kinds, rows, windows, found[s], counts[s], eye, right, downs[s])
-                        same = same and k == own
-                        if k >= 0 and z < np.inf:
-                            _colour(
-                                kinds[k],
-                                rows[k],
-                                skins[k],
-                                tiles,
-                                starts,
-                                eye,
-                                right,
-                                downs[s],
-                                z,
-                                0.5 / focal,
-                                light,
-                                colour,
-                                grain,
-                            )
-                            for c in range(3):
-                                total[c] += colour[c]
-                if same or side == 4:
-                    break
-                side = 4
-            for c in range(3):
-                out[y, x, c] = total[c] / (side * count)
+                        sum_ += colours[firsts[s, x] + t, c]
+                out[c // 3, y, x, c % 3] = sum_ / (side * max(side, 2))

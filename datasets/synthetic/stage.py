@@ -117,10 +117,10 @@ class Stage:
                 )
         return found
 
-    def picture(self, view: int, highlight: float = 0.0) -> NDArray[np.float32]:
-        """(H, W, 3) RGB grey levels, `highlight` of them where a glossy surface reflects the light to the camera."""
+    def pictures(self, view: int, highlight: float = 0.0) -> NDArray[np.float32]:
+        """(2, H, W, 3) RGB grey levels, first without the highlight and then with it (`picture`)."""
         model, eye = self._model, self._eye(view)
-        out = np.empty((self.height, self.width, 3), np.float32)
+        out = np.empty((2, self.height, self.width, 3), np.float32)
         shading.picture(
             model.kinds,
             model.rows,
@@ -137,3 +137,8 @@ class Stage:
             out,
         )
         return out
+
+    def picture(self, view: int, highlight: float = 0.0) -> NDArray[np.float32]:
+        """(H, W, 3) RGB grey levels, `highlight` of them where a glossy surface reflects the light to the camera."""
+        picture: NDArray[np.float32] = self.pictures(view, highlight)[1]
+        return picture

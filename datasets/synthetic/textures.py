@@ -15,9 +15,11 @@ def random_bytes(seed: Sequence[int], count: int) -> NDArray[np.uint8]:
 def noise(seed: Sequence[int], shape: tuple[int, ...], deviation: float) -> NDArray[np.float64]:
     """Noise of that standard deviation: sums of four random bytes, which are nearly normally distributed."""
     count = int(np.prod(shape))
-    sums = random_bytes(seed, 4 * count).reshape(4, count).sum(axis=0, dtype=np.int64)
-    spread = float(np.sqrt(4 * (256**2 - 1) / 12))
-    values: NDArray[np.float64] = (sums - 510) * (deviation / spread)
+    values: NDArray[np.float64] = (
+        random_bytes(seed, 4 * count).reshape(4, count).sum(axis=0, dtype=np.int16).astype(float)
+    )
+    values -= 510
+    values *= deviation / float(np.sqrt(4 * (256**2 - 1) / 12))
     return values.reshape(shape)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from odd_solids import KINDS, SKIN, solid
+from odd_solids import KINDS, SKIN, hit, hits, solid
 
 from matbench.datasets.synthetic import casting, solids
 from matbench.datasets.synthetic.dice import Dice
@@ -70,10 +70,20 @@ def test_a_ray_meets_what_its_twin_meets(kind: int) -> None:
         row = np.array(one.row)
         for _ in range(7):
             eye, right, down = dice.between(-0.1, 0.1), dice.between(-0.25, 0.25), dice.between(-0.2, 0.2)
-            found, expected = casting.hit(kind, row, eye, right, down), twin(kind, row, eye, right, down)
+            found, expected = hit(kind, row, eye, right, down), twin(kind, row, eye, right, down)
             assert found == pytest.approx(expected, abs=1e-9)
             hits += bool(np.isfinite(found))
     assert hits >= 3
+
+
+@pytest.mark.parametrize("kind", [*KINDS, solids.PLANE])
+def test_many_rays_at_a_time_meet_what_each_meets_alone(kind: int) -> None:
+    """To the last bit: several are computed at a time, and what is left over one by one."""
+    dice, rights = Dice(kind, 2), np.linspace(-0.4, 0.4, casting.ROOM + 7)
+    row, down = np.array(solid(kind, dice).row), dice.between(-0.1, 0.1)
+    together = hits(kind, row, 0.05, rights, down, 7, casting.ROOM)
+    alone = [hit(kind, row, 0.05, right, down) for right in rights[7:]]
+    np.testing.assert_array_equal(together, alone)
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +104,7 @@ def cast(model: Model, eye: float) -> tuple[np.ndarray, np.ndarray]:
 
 def brute(model: Model, eye: float, right: float, down: float) -> tuple[float, int]:
     """The nearest of all surfaces, each of them tried."""
-    found = [casting.hit(kind, row, eye, right, down) for kind, row in zip(model.kinds, model.rows, strict=True)]
+    found = [hit(kind, row, eye, right, down) for kind, row in zip(model.kinds, model.rows, strict=True)]
     return min(found), int(np.argmin(found))
 
 

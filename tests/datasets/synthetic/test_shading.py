@@ -29,11 +29,11 @@ def shown(
     depth, index = np.empty((HEIGHT * scale, WIDTH * scale)), np.empty((HEIGHT * scale, WIDTH * scale), np.int64)
     windows = model.windows(eye)
     casting.depths(model.kinds, model.rows, windows, eye, rights, downs, depth, index)
-    out = np.empty((*depth.shape, 3), np.float32)
+    out = np.empty((2, *depth.shape, 3), np.float32)
     shading.picture(
         model.kinds, model.rows, windows, model.skins, tiles, STARTS, eye, middle, focal, top, light, index, out
     )
-    return out
+    return out[1]
 
 
 def skin(contrast: float = 0.0, gloss: float = 0.0, period: float = 6.0) -> Skin:

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from odd_solids import KINDS, SKIN, solid
+from odd_solids import KINDS, SKIN, hit, solid
 
 from matbench.datasets.synthetic import solids
-from matbench.datasets.synthetic.casting import hit
 from matbench.datasets.synthetic.dice import Dice
 from matbench.datasets.synthetic.solids import Model, Skin, flat, round_
 
