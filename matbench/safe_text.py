@@ -28,7 +28,13 @@ def printable(text: str) -> str:
     >>> print(printable("\x1b[2Jgone"), printable("a\tb"), printable("caf\udce9"), printable("naïve 間"))
     \x1b[2Jgone a\tb caf\xe9 naïve 間
     """
-    return _HIDDEN.sub(lambda found: _escape(found[0]), text)
+    # most texts are plain, and a run has hundreds of thousands of them
+    return text if _is_plain(text) else _HIDDEN.sub(lambda found: _escape(found[0]), text)
+
+
+def _is_plain(text: str) -> bool:
+    """Is every character a visible one of ASCII, or a blank?"""
+    return text.isascii() and text.isprintable()
 
 
 def one_line(text: str) -> str:
@@ -37,7 +43,7 @@ def one_line(text: str) -> str:
     >>> one_line("\x1b[1mno such\x1b[0m\n  file")
     'no such file'
     """
-    return " ".join(_HIDDEN.sub(" ", _COLOURS.sub("", text)).split())
+    return " ".join((text if _is_plain(text) else _HIDDEN.sub(" ", _COLOURS.sub("", text))).split())
 
 
 def shortened(text: str) -> str:

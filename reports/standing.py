@@ -41,8 +41,9 @@ def witnesses(table: pd.DataFrame, scope: Shared) -> pd.DataFrame:
 def _ranks(table: pd.DataFrame, scope: Shared, unit: str, better: Better, aside: Collection[str]) -> pd.DataFrame:
     """The ranks of methods on every witness, by the scores as shown: 1 is best, ties share a mean rank."""
     rows = witnesses(table, scope).drop(columns=list(aside), errors="ignore")
-    values = [[float(text(v, unit)) if v == v else np.nan for v in row] for row in rows.to_numpy(float).tolist()]
-    shown = pd.DataFrame(np.reshape(values, rows.shape), rows.index, rows.columns, dtype=float)
+    scores, places = np.unique(rows.to_numpy(float), return_inverse=True)
+    values = np.array([float(text(v, unit)) if v == v else np.nan for v in scores.tolist()], float)
+    shown = pd.DataFrame(values[places].reshape(rows.shape), rows.index, rows.columns, dtype=float)
     return merit(shown, better).rank(axis=1)
 
 
