@@ -38,8 +38,8 @@ class Flat:
 
 
 def stored(run: Path) -> dict[str, float]:
-    """Cell -> when it was stored."""
-    return {path.parent.name: path.stat().st_mtime for path in run.glob("cells/*/cell.json")}
+    """Cell -> when it was stored; drafts, whose names begin with a point, are no cells yet."""
+    return {path.parent.name: path.stat().st_mtime for path in run.glob("cells/[!.]*/cell.json")}
 
 
 def from_cell_to_cell(times: list[float]) -> tuple[float, float]:
