@@ -50,7 +50,6 @@ class SSD(OnGrid):
         cost = np.ascontiguousarray(sweep.cost(context.threads).transpose(0, 2, 1))
         found = winner(cost, cost)
         sure = {scene.ref: peak_ratio(cost, found, context.threads)}
-        answer = (
-            found if self.fit else np.ceil(found - np.float32(0.5))
-        )  # a fraction of a half is a tie: the farther plane
+        # a fraction of a half is a tie: the farther plane
+        answer = found if self.fit else np.ceil(found - np.float32(0.5))
         return Estimate({scene.ref: sweep.disparity(answer)}, work=sweep.work, confidence=sure)
