@@ -62,7 +62,8 @@ class Inference:
         ----------
         ratios
             (H, W), overwritten if it is given, with how sure the reference view's answers are: the `peak_ratio` of
-            their sums of path costs, 0 where mending has moved the answer by more than a pixel of the pair.
+            their sums of path costs, 0 where mending has moved the answer by more than a pixel of the pair. Surfaces
+            and outlines, which move answers after that, leave it as it is.
         """
 
         def cost(one: Matcher, phases: Features, room: Room) -> NDArray[np.float32]:
@@ -148,7 +149,7 @@ class Inference:
     ) -> NDArray[np.float32]:
         """(views, H, W) the maps `smoothed` and `outlined` in pixels of the field's pair.
 
-        Unless they are to be smoothed, too, `mended` pixels, which are not sure at all, are only outlined.
+        Pixels that mending has moved, which are not sure at all, are smoothed only if `mended`; all are outlined.
         """
         scene, out = matcher.scene, np.empty_like(maps)
         pixels = np.float32(scene.pair_steps / matcher.space.fineness)

@@ -44,7 +44,7 @@ class Niquin:
     more than one plane, so that slanted surfaces do not hide themselves; the others, and those that do not hold the
     point, are `hidden` in number. Delta is the mean dissimilarity of consecutive views that both see it. Who sees what
     follows from the maps of the pass before, at first none: nothing is hidden then. The plane that a pixel has would
-    give way if it took another one: farther planes are hidden by what hides that one alone. A pass offers every plane
+    give way if it took another one: farther planes are hidden by what hides its own. A pass offers every plane
     once to all pixels of all views. After the first, one counts only if E, with what its own maps hide, falls. The
     history holds E per pixel after each pass that counts.
 

@@ -22,7 +22,7 @@ def _outline(found, image, out):  # type: ignore[no-untyped-def]
                 near, far = found[y, x], found[y, x + side]
                 if not near - far > jump:
                     continue
-                if abs(near - found[y, x - side]) >= same or abs(far - found[y, x + 2 * side]) >= same:
+                if not (abs(near - found[y, x - side]) < same and abs(far - found[y, x + 2 * side]) < same):
                     continue
                 part, whole = np.int64(0), np.int64(0)
                 for c in range(image.shape[2]):

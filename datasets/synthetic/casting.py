@@ -76,7 +76,7 @@ def _flat(kind, row, eye, rights, down, begin, count, work):  # type: ignore[no-
     for i in range(count):
         right = rights[begin + i]
         slope = r3 * right + level + r5
-        z = -ahead / slope
+        z = -ahead / (slope if slope != 0 else 1.0)
         z = z if z > 0 and slope != 0 else np.inf
         x, y, far = ox + z * right, oy + z * down, oz + z
         work[i] = z
@@ -115,8 +115,8 @@ def _round(kind, row, eye, rights, down, begin, count, work):  # type: ignore[no
         rest = whole if closed else open_
         under = half * half - square * rest
         met = under > 0 and square != 0
-        root = np.sqrt(under if met else 1.0)
-        one, two = (-half - root) / square, (-half + root) / square
+        root, by = np.sqrt(under if met else 1.0), square if met else 1.0
+        one, two = (-half - root) / by, (-half + root) / by
         work[i] = (two if two < one else one) if met else -1.0
         work[i + ROOM] = (one if two < one else two) if met else -1.0
         work[i + 2 * ROOM] = dz

@@ -15,7 +15,7 @@ from matbench.datasets.synthetic.surfaces import Array
 
 @frozen(eq=False, slots=False)
 class Stage:
-    """Pinhole cameras in a row before a world, which fills every picture.
+    """Pinhole cameras in a row before a world, which fills every picture but very tall ones.
 
     Camera j stands at X = (j - ref) * near / steps; the disparity of a point at depth Z is ``width * near / steps / Z``
     px per view step.
@@ -50,8 +50,9 @@ class Stage:
         return library([GRAIN, *(solid.skin.tile for solid in self.drawn.solids)])
 
     def disparity(self, depth: Array) -> Array:
-        """Px per view step."""
-        return self.width * self.drawn.near / self.steps / depth
+        """Px per view step; NaN where a ray meets nothing and the depth is infinite."""
+        disparity: Array = self.width * self.drawn.near / self.steps / depth
+        return np.where(np.isfinite(depth), disparity, np.nan)
 
     def _eye(self, view: int) -> float:
         return (view - self.ref) * self.drawn.near / self.steps

@@ -61,8 +61,18 @@ METHODS = (
     "sgbm",
     "sgbm[block_size=9]",
     "sgbm[fill=false]",
+    "kang_szeliski[similarity=shared]",
+    "guided_filter[similarity=shared]",
+    "ssd[similarity=shared]",
+    "scanline[similarity=shared]",
+    "graph_cut[similarity=shared]",
+    "voxel_coloring[rule=chi_squared]",
+    "niquin",
+    "niquin[similarity=shared]",
+    "kolmogorov_zabih",
+    "kolmogorov_zabih[similarity=shared]",
 )
-"""All methods and further settings of them; without `kolmogorov_zabih` and `niquin`, which take minutes a scene."""
+"""All methods and further settings of them."""
 
 REGIONS = ("nonocc", "all", "occ")
 RESAMPLES = 2000

@@ -52,6 +52,16 @@ def test_wrong_names_are_told_in_a_line(name: str, options: dict[str, str], word
     assert "\n" not in str(caught.value)
 
 
+def test_where_a_tall_picture_sees_past_the_world_there_is_no_truth() -> None:
+    scene = SYNTHETIC.load("world-123", {"size": "160x240"}, None)
+    truth = scene.truth[scene.ref]
+    missed = np.isnan(truth)
+    assert 0 < missed.sum() < 0.01 * truth.size
+    assert truth[~missed].min() > 0
+    assert not any(region[missed].any() for region in scene.regions.values())
+    assert not scene.visible[scene.ref][: scene.ref, missed].any()
+
+
 @pytest.mark.parametrize(("family", "seed"), [*zip(FAMILIES, range(20, 30), strict=False), ("mixed", 1)])
 def test_a_scene_is_whole(family: str, seed: int) -> None:
     scene = SYNTHETIC.load("world", TINY | {"family": family, "seed": str(seed)}, None)
