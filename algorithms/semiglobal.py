@@ -364,12 +364,8 @@ class SemiGlobal:
         room: Room | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """The same, and (H, W) the `peak_ratio` of the sums of path costs, if it is asked for."""
-        tops = np.zeros(len(cost))
-
-        def top_of(first: int, end: int) -> None:
-            tops[first:end] = cost[first:end].max(axis=(1, 2), initial=0)
-
-        over_rows(top_of, len(cost), threads)
+        tops = np.zeros(len(cost), cost.dtype)
+        over_rows(lambda top, end: np.copyto(tops[top:end], cost[top:end].max((1, 2), initial=0)), len(cost), threads)
         largest = float(tops.max(initial=0))
         complete = not np.isnan(largest)
         steps = self.small_step, self.large_step, self.contrast

@@ -158,32 +158,6 @@ def candidates(windows, down, found):  # type: ignore[no-untyped-def]
 
 
 @inner
-def after(rights, count, limit):  # type: ignore[no-untyped-def]
-    """How many of ascending slopes do not exceed a limit."""
-    low, high = 0, count
-    while low < high:
-        middle = (low + high) // 2
-        if rights[middle] > limit:
-            high = middle
-        else:
-            low = middle + 1
-    return low
-
-
-@inner
-def before(rights, count, limit):  # type: ignore[no-untyped-def]
-    """How many of ascending slopes are below a limit."""
-    low, high = 0, count
-    while low < high:
-        middle = (low + high) // 2
-        if rights[middle] < limit:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@inner
 def cast(kinds, rows, windows, found, met, eye, rights, down, count, work, depth, index):  # type: ignore[no-untyped-def]
     """Depth and number of the nearest surface on each ray of a row; infinite and -1 where there is none.
 
@@ -202,7 +176,8 @@ def cast(kinds, rows, windows, found, met, eye, rights, down, count, work, depth
     for j in range(met):
         k = found[j]
         least = windows[k, 4]
-        begin, end = after(rights, count, windows[k, 0] - MARGIN), before(rights, count, windows[k, 1] + MARGIN)
+        begin = np.searchsorted(rights[:count], windows[k, 0] - MARGIN, side="right")
+        end = np.searchsorted(rights[:count], windows[k, 1] + MARGIN)
         while begin < end:
             some = min(end - begin, ROOM)
             hits(kinds[k], rows[k], eye, rights, down, begin, some, work)
