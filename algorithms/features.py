@@ -1,5 +1,6 @@
 """Features that are compared besides colour: horizontal gradient and census of the luma (docs/concepts/methods.md)."""
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +14,8 @@ CENSUS_WORDS = CENSUS_BITS // WORD
 UNITS = 64  # of a grey level, where it is kept as a whole number
 SHIFTS = 32, 160  # grey levels added to samples and slopes: no cubic overshoot, and no slope, is less than that below 0
 LUMA = (0.299, 0.587, 0.114)
+AROUND = 2  # pixels to either side in which slopes are alike weak or strong
+WEAKEST = 0.2  # grey levels: what hardly slopes at all is noise
 
 
 def luma(rows: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -26,6 +29,34 @@ def gradient(grey: NDArray[np.float32], fineness: int) -> NDArray[np.float32]:
     q = fineness
     wide = np.concatenate([np.repeat(grey[..., :1], q, -1), grey, np.repeat(grey[..., -1:], q, -1)], axis=-1)
     return np.asarray((wide[..., 2 * q :] - wide[..., : -2 * q]) * np.float32(0.5), np.float32)
+
+
+def strengthened(slopes: NDArray[np.float32], fineness: int, texture: float, threads: int = 1) -> NDArray[np.float32]:
+    """Slopes in which weak texture says as much as strong: times texture / (s + 0.2), where that is more than 1.
+
+    s is the root mean square of the slopes in the 5x5 pixels around, those beyond an edge mirrored. Shading by
+    texture that is hardly to be seen is often all that a wall shows. So differences of slopes are measured by what is
+    usual there, as correlation does that is normalised by the local contrast, but strong texture stays as it is.
+
+    Parameters
+    ----------
+    slopes
+        (views, H, samples) from `gradient`.
+    texture
+        Grey levels; 0 leaves all slopes as they are.
+    """
+    out = slopes.copy()
+    window = 2 * AROUND * fineness + 1, 2 * AROUND + 1
+
+    def strengthen(view: int, _: int) -> None:
+        mean = cv2.blur(slopes[view] * slopes[view], window, borderType=cv2.BORDER_REFLECT)
+        usual = np.sqrt(np.maximum(mean, 0)) + np.float32(WEAKEST)
+        out[view] *= np.maximum(np.float32(texture) / usual, np.float32(1))
+        np.clip(out[view], -SHIFTS[1], SHIFTS[1], out=out[view])
+
+    if slopes.size and texture:
+        over_rows(strengthen, len(out), threads, 1)
+    return out
 
 
 @kernel

@@ -337,7 +337,7 @@ class SemiGlobal:
 
     small_step: float = field(default=0.2, validator=validators.ge(0))
     large_step: float = field(default=1.0, validator=validators.ge(0))
-    contrast: float = field(default=25.0, validator=validators.gt(0))
+    contrast: float = field(default=12.0, validator=validators.gt(0))
 
     def infer(self, cost: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
         """(H, W) plane index, to a fraction of a plane, of the least sum of path costs (`aggregate`, `winner`).

@@ -10,7 +10,7 @@ from attrs import evolve, field, frozen, validators
 from numpy.typing import NDArray
 
 from matbench.algorithms import mccnn
-from matbench.algorithms.features import SHIFTS, census, gradient, luma, same_surface, whole
+from matbench.algorithms.features import SHIFTS, census, gradient, luma, same_surface, strengthened, whole
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel, unread
 from matbench.algorithms.pixels import PIXELS, compare_pixels, most_costly
@@ -65,7 +65,7 @@ class Matching:
         of the pixels' 7x7 census differ, ``census``: rho = 1 - the mean over the two windows of
         min(h, 20) / 20. ``mixed``: rho = 1 - that of 0.35 |dI| / 20 + 0.25 min(|dg|, 10) / 10
         + 0.40 min(h, 20) / 20, |dI| being the mean absolute difference over the colours and dg that
-        of the horizontal gradients of the luma. ``mccnn``: rho = f g, or 0 where that is less, with f and g
+        of the horizontal gradients of the luma (see `texture`). ``mccnn``: rho = f g, or 0 where that is less, with f and g
         descriptors of 11x11 pixels by a trained network (`algorithms.mccnn`); it takes
         ``pip install 'matbench-stereo[mccnn]'``.
     window
@@ -75,6 +75,10 @@ class Matching:
     truncation
         Differences of a pixel's colours (their root mean square; in ``mixed`` their mean) count at
         most this many grey levels; 0 = no limit.
+    texture
+        Grey levels. The gradients of ``mixed`` are multiplied by texture / (s + 0.2), where that is more than 1, with s
+        their root mean square in the 5x5 pixels around: so weak texture says as much as strong. 0 takes them as
+        they are.
     colour
         Compare colours, or only luma: 0.299 R + 0.587 G + 0.114 B.
     alike
@@ -90,6 +94,7 @@ class Matching:
     window: int = field(default=3, validator=odd)
     sigma: float = field(default=9.0, validator=validators.gt(0))
     truncation: float = field(default=20.0, validator=validators.ge(0))
+    texture: float = field(default=6.0, validator=validators.ge(0))
     colour: bool = True
     alike: float = field(default=10.0, validator=validators.ge(0))
 
@@ -100,6 +105,7 @@ class Matching:
         takes = {
             "sigma": (form in ("ssd", "rms"), "similarity=ssd or rms"),
             "truncation": (form not in ("census", "mccnn"), "another similarity than census and mccnn"),
+            "texture": (form == "mixed", "similarity=mixed"),
             "alike": (form in ("census", "mixed"), "similarity=census or mixed"),
             "colour": (
                 form != "mccnn" and (form != "census" or self.alike > 0),
@@ -126,7 +132,8 @@ class Matcher:
     rows
         (views, channels, H, samples) float32 rows sampled at the space's fineness: colours, or luma.
     slopes
-        (views, H, samples) horizontal gradients of the luma; H is 0 if the similarity does not use them.
+        (views, H, samples) horizontal gradients of the luma, `strengthened`; H is 0 if the similarity does not use
+        them.
     bits, masks
         (views, words, H, samples) census of the luma, and which of its pixels are likely on the same surface
         as the middle one; H is 0 if the similarity does not use them.
@@ -156,6 +163,7 @@ class Matcher:
         rows = fine_rows(chosen.views, space.fineness, threads)
         grey, form = luma(rows), settings.similarity
         slopes = gradient(grey if form == "mixed" else grey[:, :0], space.fineness)
+        slopes = strengthened(slopes, space.fineness, settings.texture, threads)
         bits = census(grey if form in ("census", "mixed") else grey[:, :0], space.fineness, threads)
         if not settings.colour:
             rows = grey[:, None]

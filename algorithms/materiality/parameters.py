@@ -68,7 +68,7 @@ class Solver:
     tolerance: float = field(default=0.0, validator=validators.ge(0))
     binarization: Binarization = field(default="volume", validator=validators.in_(get_args(Binarization)))
     visibility: bool = True
-    material: float = field(default=0.25, validator=validators.ge(0))
+    material: float = field(default=0.15, validator=validators.ge(0))
     confidence: Confidence = field(default="costs", validator=validators.in_(get_args(Confidence)))
 
     @property

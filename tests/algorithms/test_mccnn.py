@@ -148,7 +148,7 @@ def test_relatives_take_the_learned_costs(name: str, other_weights: tuple[Layer,
 
 
 def test_parameters_that_it_does_not_read_are_refused(other_weights: tuple[Layer, ...]) -> None:
-    assert set(Matching(similarity="mccnn").silent) == {"sigma", "truncation", "alike", "colour"}
+    assert set(Matching(similarity="mccnn").silent) == {"sigma", "truncation", "texture", "alike", "colour"}
 
 
 def test_without_the_package_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

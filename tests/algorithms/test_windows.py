@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neighbours import around, like_middle, random_scene
 
-from matbench.algorithms.features import UNITS, luma
+from matbench.algorithms.features import UNITS, luma, strengthened
 from matbench.algorithms.sampling import fine_rows
 from matbench.algorithms.similarity import Matcher, Matching
 
@@ -17,7 +17,15 @@ def whole(values):
 
 def slope(row, sample, q):
     """Half the difference of the samples one pixel to either side, those beyond an edge taken from it."""
-    return whole((row[min(sample + q, row.size - 1)] - row[max(sample - q, 0)]) / np.float32(2))
+    return (row[min(sample + q, row.size - 1)] - row[max(sample - q, 0)]) / np.float32(2)
+
+
+def slopes_of(grey, q, texture):
+    """(views, H, samples) slopes, which `test_features` tells to be made as strong as texture."""
+    own = np.empty_like(grey)
+    for view, y, sample in np.ndindex(grey.shape):
+        own[view, y, sample] = slope(grey[view, y], sample, q)
+    return whole(strengthened(own, q, texture))
 
 
 def darker(grey, y, sample, q):
@@ -40,6 +48,7 @@ def twin(matcher: Matcher) -> np.ndarray:
     grey = luma(rows)  # in float32, as a pixel is darker than another by their last bits, too
     if not how.colour:
         rows = np.repeat(grey[:, None], 3, axis=1)
+    slopes = slopes_of(grey, space.fineness, how.texture)
     fine, rows = whole(rows), rows.astype(float)
     limit, radius, q = how.truncation or np.inf, how.window // 2, space.fineness
     out = np.zeros((space.rows, len(matcher.pairs), space.planes, space.columns))
@@ -62,11 +71,11 @@ def twin(matcher: Matcher) -> np.ndarray:
                     like = [like_middle(fine[v], y + dy, u, q, how.alike) for v, u in at] if how.alike else None
                     cost = min(differing(order, like), 20) / 20
                     if how.similarity == "mixed":
-                        slopes = [slope(grey[v, y + dy], u, q) for v, u in at]
+                        steep = [slopes[v, y + dy, u] for v, u in at]
                         cost *= 0.40
                         gap = fine[i, :, y + dy, ui + dx] - fine[j, :, y + dy, uj + dx]
                         cost += 0.35 * min(np.mean(np.abs(gap)), limit) / 20
-                        cost += 0.25 * min(abs(slopes[0] - slopes[1]), 10) / 10
+                        cost += 0.25 * min(abs(steep[0] - steep[1]), 10) / 10
                     taps.append(cost)
         mean = np.mean(taps)
         forms = {
@@ -92,10 +101,11 @@ def twin(matcher: Matcher) -> np.ndarray:
     truncation=st.sampled_from([0.0, 60.0]),
     colour=st.booleans(),
     most=st.sampled_from([0.0, 30.5, 100.5]),
+    texture=st.sampled_from([0.0, 6.0, 90.0]),
     seed=st.integers(0, 99),
 )
 def test_similarity_is_its_equation(
-    n, height, width, least, extent, fineness, window, which, form, truncation, colour, most, seed
+    n, height, width, least, extent, fineness, window, which, form, truncation, colour, most, texture, seed
 ):
     scene = random_scene(n, height, width, least, least + extent, seed)
     matcher = Matcher.of(
@@ -110,6 +120,7 @@ def test_similarity_is_its_equation(
             truncation=truncation,
             colour=colour,
             alike=most,
+            texture=texture,
         ),
     )
     rho, expected = matcher.all(), twin(matcher)
