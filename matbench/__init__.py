@@ -3,6 +3,7 @@
 ``import matbench`` is quick: each name below is imported when it is first used.
 """
 
+import time
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from matbench.scenes.catalogue import load_scene
     from matbench.scenes.dataset import Dataset, Download, Listing, Remote
     from matbench.space import DisparitySpace, Volume, visibility
+
+_LOADED = time.time()
+"""No other module was read before: code that has changed since may not be what runs here."""
 
 _HOMES = {
     "Algorithm": "algorithm",

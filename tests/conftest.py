@@ -29,6 +29,8 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache()))
 # tests neither find nor touch the scenes of whoever runs them
 _own = tempfile.TemporaryDirectory(prefix="matbench-tests-")
 os.environ["XDG_DATA_HOME"] = _own.name
+# each scene is computed by the code that is tested
+os.environ["MATBENCH_CACHE_MB"] = "0"
 # tests press Ctrl-C: a shell that starts them in the background would have their processes ignore it
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -17,6 +17,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from matbench import Context, Estimate, Scene, load_scene
+from matbench.files.own_folders import cache_folder
 
 _CHUNK = 1 << 24
 _OVERLAP = 4096
@@ -53,8 +54,8 @@ def _memory() -> Iterator[tuple[mmap.mmap, int]]:
 
 
 def _files() -> Iterator[tuple[bytes, int]]:
-    """All open files, and all in shared memory."""
-    paths = [*Path("/proc/self/fd").iterdir(), *Path("/dev/shm").rglob("*")]  # noqa: S108
+    """All open files, all in shared memory, and all that is kept for this user."""
+    paths = [*Path("/proc/self/fd").iterdir(), *Path("/dev/shm").rglob("*"), *cache_folder().rglob("*")]  # noqa: S108
     for path in paths:
         with suppress(OSError):
             if stat.S_ISREG(path.stat().st_mode):

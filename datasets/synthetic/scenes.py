@@ -7,7 +7,10 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from matbench import regions as region_masks
+from matbench import scene as scenes
 from matbench import spec
+from matbench.datasets import choose
 from matbench.datasets.choose import search_range, views_and_reference
 from matbench.datasets.synthetic import asking, random_scenes
 from matbench.datasets.synthetic.asking import HEIGHT, OPTIONS, VIEWS, WIDTH, Asked
@@ -19,11 +22,20 @@ from matbench.datasets.synthetic.worlds import WORLDS
 from matbench.errors import unknown
 from matbench.regions import regions
 from matbench.scene import Range, Scene
+from matbench.scenes import kept
 from matbench.scenes.dataset import Listing
 from matbench.space import DisparitySpace, Volume, surface
 
 _BASELINE = 1 / 40
 """In units of the world. The focal length is the width of a picture: at 240 px the disparity is 6 / Z px per step."""
+
+
+_HERE = Path(__file__).parent
+_SOURCES = (
+    *sorted(file for file in _HERE.iterdir() if file.suffix in (".py", ".json")),
+    *(Path(str(module.__file__)) for module in (choose, region_masks, scenes, spec)),
+)
+"""What decides the pixels and the truth of a scene besides its name and options."""
 
 
 @frozen(eq=False)
@@ -115,7 +127,12 @@ class Synthetic:
         world all is drawn by it), `views` and `baseline` (which views to keep), `ref` (the view to score, by number),
         `disparities` to search, and the faults of cameras (`cameras.Strengths`). Regions are found in pictures without
         these faults, so that they stay the same in a sweep. Only misalignment moves them with the picture.
+
+        A scene that was computed before is read, where it is still kept (`matbench.scenes.kept`).
         """
+        return kept.scene(kept.key(_SOURCES, name, dict(options)), lambda: self._computed(name, options))
+
+    def _computed(self, name: str, options: Mapping[str, str]) -> Scene:
         ask = _read(name, options)
         labels = [str(view) for view in range(ask.n)]
         from_ref = sorted(range(ask.n), key=lambda view: (abs(view - ask.ref), view))

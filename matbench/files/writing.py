@@ -28,14 +28,21 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 @contextmanager
-def drafted(path: Path) -> Iterator[BinaryIO]:
-    """A new file beside `path`. It is moved there when the block ends, and replaces what is there; else it goes."""
+def drafted(path: Path, *, settled: bool = True) -> Iterator[BinaryIO]:
+    """A new file beside `path`. It is moved there when the block ends, and replaces what is there; else it goes.
+
+    Parameters
+    ----------
+    settled
+        Wait until it is on the disk (`settle`)? Not where a reader tells by its digest whether a power cut has cut it.
+    """
     draft = path.with_name(_draft(path.name))
     try:
         with draft.open("xb") as file:
             yield file
-            file.flush()
-            settle(file.fileno())
+            if settled:
+                file.flush()
+                settle(file.fileno())
         move(draft, path)
     except BaseException as error:
         draft.unlink(missing_ok=True)

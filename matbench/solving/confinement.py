@@ -1,7 +1,7 @@
-"""What a process that runs methods can reach: the run folder to read only, shared memory of its own (Linux).
+"""What a process that runs methods can reach: the run folder to read only, shared memory of its own, no kept scenes.
 
-Done in a mount namespace, which needs either the right to mount or user namespaces. Where neither is there, nothing is
-confined and `shut_in` says so; what a method then rewrites is found out by digests (`matbench.solving.run`).
+Done in a mount namespace (Linux), which needs either the right to mount or user namespaces. Where neither is there,
+nothing is confined and `shut_in` says so; what a method then rewrites is found out by digests (`matbench.solving.run`).
 """
 
 import ctypes
@@ -19,11 +19,17 @@ UNCONFINED = "MATBENCH_UNCONFINED"
 SHARED_MEMORY = "/dev/shm"  # noqa: S108 -- POSIX's name for it
 
 
-def shut_in(read_only: Path, shared_mb: int) -> bool:
+def shut_in(read_only: Path, shared_mb: int, hidden: Path | None = None) -> bool:
     """Let this process, and all that it starts, read a folder but not write to it; whether that worked.
 
     Shared memory becomes one of its own, of `shared_mb` MiB at most, which is gone when the last of them ends: what a
     method leaves there harms nobody.
+
+    Parameters
+    ----------
+    hidden
+        A folder in whose place they see an empty one that cannot be written to. It is made if it is not there: else
+        they would see it as soon as another process makes it.
     """
     if sys.platform != "linux":
         return False
@@ -35,7 +41,11 @@ def shut_in(read_only: Path, shared_mb: int) -> bool:
         for name, text in (("setgroups", "deny"), ("uid_map", f"{user} {user} 1"), ("gid_map", f"{group} {group} 1")):
             with suppress(OSError):
                 Path("/proc/self", name).write_text(text)
-    folder = os.fsencode(read_only)
+    folder, covered = os.fsencode(read_only), None
+    if hidden is not None:
+        with suppress(OSError):  # where it cannot be made, nothing will be there
+            hidden.mkdir(mode=0o700, parents=True, exist_ok=True)
+        covered = os.fsencode(hidden) if os.path.isdir(hidden) else None  # noqa: PTH112 -- also where none may look
 
     def mount(source: bytes | None, target: bytes, kind: bytes | None, flags: int, options: bytes | None) -> bool:
         return bool(libc.mount(source, target, kind, ctypes.c_ulong(flags), options) == 0)
@@ -45,9 +55,11 @@ def shut_in(read_only: Path, shared_mb: int) -> bool:
         return False
     if Path(SHARED_MEMORY).is_dir():
         mount(b"tmpfs", SHARED_MEMORY.encode(), b"tmpfs", _NOSUID | _NODEV, f"mode=1777,size={shared_mb}m".encode())
-    if not mount(folder, folder, None, _BIND, None):
+    if not (mount(folder, folder, None, _BIND, None) and mount(None, folder, None, _BIND | _REMOUNT | _RDONLY, None)):
         return False
-    return mount(None, folder, None, _BIND | _REMOUNT | _RDONLY, None)
+    # last: the folder above may hold it, and would be bound without what is mounted in it
+    flags = _NOSUID | _NODEV | _RDONLY
+    return covered is None or mount(b"tmpfs", covered, b"tmpfs", flags, b"mode=0500")
 
 
 @cache
@@ -62,7 +74,7 @@ def is_possible() -> bool:
         pid = os.fork()
         if not pid:
             try:
-                os._exit(0 if shut_in(folder, 1) else 1)
+                os._exit(0 if shut_in(folder, 1, folder / "hidden") else 1)
             finally:
                 os._exit(1)
         return os.waitpid(pid, 0)[1] == 0

@@ -34,7 +34,8 @@ class Keeper:
 
     def __init__(self, preload: Iterable[str] = ()) -> None:
         own = ["matbench.solving.keeper_process", "matbench.solving.numba_ready"]
-        processes.start_server([*own, "cv2", "threadpoolctl", *preload, "matbench.solving.kernels_ready"])
+        others = ["cv2", "platformdirs", "threadpoolctl"]
+        processes.start_server([*own, *others, *preload, "matbench.solving.kernels_ready"])
         self.line, theirs = Pipe()
         self._watcher = Watcher(keep, (theirs,))
         theirs.close()  # else this process itself would keep the line open when the keeper dies

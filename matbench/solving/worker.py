@@ -34,7 +34,7 @@ from matbench.plans.settings import Settings
 from matbench.runs.cell_files import CONFIDENCE
 from matbench.runs.outcome import DEVICE, FINAL, Outcome, Status
 from matbench.scene import Scene
-from matbench.scenes import views_only
+from matbench.scenes import kept, views_only
 from matbench.solving import confinement, memory, processes
 from matbench.solving.returned import checked_confidence, checked_maps, checked_volume, device_cost
 
@@ -312,7 +312,7 @@ def serve(line: Connection, job: Job, confined: bool) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         if confined:
-            confinement.shut_in(job.run, job.settings.memory_each())
+            confinement.shut_in(job.run, job.settings.memory_each(), kept.folder())
         faulthandler.enable(file=2)
         memory.confine(job.settings.memory_each())
         processes.use_threads(job.threads)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from refusing import refusing
 
-from matbench.files.writing import draft_folder, settle, write_bytes, write_text
+from matbench.files.writing import draft_folder, drafted, settle, write_bytes, write_text
 
 
 def test_what_is_written_is_there_and_nothing_else(tmp_path: Path) -> None:
@@ -34,6 +34,16 @@ def test_what_fails_leaves_the_old_file_and_no_draft(tmp_path: Path, monkeypatch
         write_text(path, "new")
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_need_not_be_on_the_disk_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    waited: list[int] = []
+    monkeypatch.setattr(os, "fsync", waited.append)
+    for settled, count in ((False, 0), (True, 1)):
+        with drafted(tmp_path / "a", settled=settled) as file:
+            file.write(b"content")
+        assert len(waited) == count
+        assert (tmp_path / "a").read_bytes() == b"content"
 
 
 def test_a_link_is_replaced_and_what_it_names_is_left_alone(tmp_path: Path) -> None:

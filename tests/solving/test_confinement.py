@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from forking import beside
+from forking import beside, in_child
 
 from matbench.solving import confinement
 from matbench.solving.confinement import SHARED_MEMORY, shared_memory_mb, shut_in
@@ -68,6 +68,39 @@ def test_shared_memory_is_its_own_and_bounded(tmp_path: Path) -> None:
 
     assert in_a_process(is_bounded)
     assert not name.exists()
+
+
+@pytest.mark.parametrize("name", ["kept", "run/kept", "new/kept", "link"])
+def test_what_is_hidden_is_empty_and_stays_so(name: str, tmp_path: Path) -> None:
+    """Also where it lies in the run folder, is not there yet, or is a link; and whatever others put there later."""
+    run, hidden = tmp_path / "run", tmp_path / name
+    for folder in (run, tmp_path / "kept", run / "kept"):
+        folder.mkdir()
+        (folder / "truth").write_text("secret")
+    (tmp_path / "link").symlink_to("kept")
+    told, tell = os.pipe()
+
+    def inside() -> list[object]:
+        pid = os.fork()
+        if not pid:  # it is not shut in
+            os.read(told, 1)
+            (hidden / "later").write_text("secret")
+            os._exit(0)
+        assert shut_in(run, 10, hidden)
+        os.write(tell, b"!")
+        assert not os.waitpid(pid, 0)[1]
+        places = [str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.name in ("truth", "later")]
+        return [*sorted(places), refused((hidden / "mine").touch)]
+
+    every = {"kept/truth", "run/kept/truth", "run/truth"}
+    seen = every - {f"{'kept' if name == 'link' else name}/truth"}
+    assert in_child(inside) == [*sorted(seen), "Read-only file system"]
+    assert (hidden / "later").read_text() == "secret", "others see what is there"
+
+
+def test_what_cannot_be_made_need_not_be_hidden(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    assert in_child(lambda: shut_in(tmp_path, 10, tmp_path / "file" / "kept"))
 
 
 def refused(act) -> str:

@@ -5,11 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rigs import SMALL
+from scenes_alike import alike
 
-from matbench.datasets.synthetic import SYNTHETIC, WORLDS, materiality
+from matbench import code, load_scene
+from matbench.datasets.synthetic import SYNTHETIC, WORLDS, materiality, scenes
 from matbench.errors import UserError
 from matbench.regions import textureless
 from matbench.scene import Scene
+from matbench.scenes import kept
 
 
 @pytest.fixture(scope="module", params=sorted(WORLDS))
@@ -190,3 +193,82 @@ def test_listings_need_no_data(tmp_path: Path) -> None:
     assert SYNTHETIC.listings(None) == SYNTHETIC.listings(tmp_path)
     found = {listing.name: listing.present for listing in SYNTHETIC.listings(None) if not listing.endless}
     assert found == dict.fromkeys(WORLDS, True)
+
+
+OTHERWISE = {
+    "matbench._moved": "old names only",
+    "matbench.code": "imported by plug-ins",
+    "matbench.datasets.synthetic.make_appearance": "makes the data, which count",
+    "matbench.errors": "messages only",
+    "matbench.parameters": "of methods",
+    "matbench.safe_text": "messages only",
+    "matbench.scenes.dataset": "no code but types",
+    "matbench.space": "`materiality` only, which is not kept",
+    "matbench.syntax": "imported by plug-ins",
+    "matbench.typed": "of methods",
+}
+"""Modules that decide no pixel -> why."""
+
+
+def test_all_code_and_data_that_decide_a_scene_are_known() -> None:
+    """A module that is new here is either named among the sources of what is kept, or above with a reason."""
+    own = Path(scenes.__file__).parent
+    known = {path.resolve() for path in scenes._SOURCES}
+    assert {path.resolve() for path in own.iterdir() if path.suffix not in (".pyc", "")} <= known
+    parts = code.of_module(scenes.__name__).files
+    others = {name for name, path in parts.items() if path.resolve() not in known}
+    needless = {name for name in others if name.startswith(("matbench.files.", "matbench.plans.", "matbench.scenes."))}
+    assert others - needless <= set(OTHERWISE)
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv(kept.VARIABLE, "100")
+    return tmp_path / "matbench" / "scenes"
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("world", SMALL | {"seed": "7"}),
+        ("world-thin-3", SMALL | {"n": "7", "views": "3", "blur": "0.5"}),
+        ("highlight", SMALL | {"gain": "0.2", "misaligned": "1.5", "ref": "1"}),
+        ("spheres", SMALL | {"baseline": "2", "disparities": "0:21"}),
+    ],
+)
+def test_a_scene_is_kept_to_the_bit(
+    name: str, options: dict[str, str], cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(kept.VARIABLE, "0")
+    computed = SYNTHETIC.load(name, options, None)
+    monkeypatch.setenv(kept.VARIABLE, "100")
+    alike(SYNTHETIC.load(name, options, None), computed)
+    assert len(list(cache.iterdir())) == 1
+    monkeypatch.setattr(scenes, "_read", lambda *_: pytest.fail("it is computed although it is kept"))
+    alike(SYNTHETIC.load(name, dict(reversed(options.items())), None), computed)
+    alike(load_scene(f"synthetic/{name}[{' '.join(f'{key}={value}' for key, value in options.items())}]"), computed)
+
+
+def test_every_option_makes_another_scene(cache: Path) -> None:
+    scenes_kept = [SYNTHETIC.load("box", options, None) for options in (SMALL, SMALL | {"noise": "2"})]
+    assert scenes_kept[0].digest != scenes_kept[1].digest
+    assert len(list(cache.iterdir())) == 2
+
+
+def test_what_cannot_be_is_refused_and_nothing_is_kept(cache: Path) -> None:
+    for name, options in (("boxes", {}), ("world", {"seed": "x"}), ("box", {"views": "1"})):
+        with pytest.raises(UserError):
+            SYNTHETIC.load(name, options, None)
+    assert not cache.exists()
+
+
+def test_with_a_source_that_changed_nothing_is_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("matbench._LOADED", 0.0)
+    SYNTHETIC.load("box", SMALL, None)
+    assert not cache.exists()
+
+
+def test_the_exact_volume_is_not_kept(cache: Path) -> None:
+    materiality("box", SMALL)
+    assert not cache.exists()
