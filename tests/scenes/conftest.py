@@ -8,6 +8,7 @@ import pytest
 from toy_downloads import FOLDER, PICTURES
 
 from matbench.files.images import has_pixels, pixel_digests
+from matbench.scenes import kept
 from matbench.scenes.dataset import Download, Remote
 
 
@@ -27,3 +28,11 @@ def toy(site, tmp_path: Path) -> Download:
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
     return tmp_path / "data"
+
+
+@pytest.fixture
+def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where scenes are kept in a test; there is room for 100 MiB of them."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv(kept.VARIABLE, "100")
+    return tmp_path / "cache" / "matbench" / "scenes"
