@@ -111,7 +111,7 @@ def scene(name: str | None, make: Callable[[], Scene]) -> Scene:
     if name is None or there is None or not most:
         return make()
     place = there / f"{name}.scene"
-    with suppress(OSError, ValueError, UserError, MemoryError):
+    with suppress(OSError, ValueError, MemoryError):
         return _read(place, name, most // _SHARE)
     made = make()
     with suppress(OSError, ValueError, MemoryError):
@@ -124,7 +124,7 @@ def _read(place: Path, name: str, most: int) -> Scene:
 
     Raises
     ------
-    OSError, ValueError, UserError
+    OSError, ValueError
         If there is none, or it is not as this user has written it.
     """
     with open_plain(place, most=most, follow=False) as file:
