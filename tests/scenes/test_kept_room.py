@@ -2,6 +2,8 @@
 
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -85,6 +87,29 @@ def test_one_that_takes_more_than_its_share_is_not_kept(there: Path, monkeypatch
     assert [got(1, KEY, rows), got(1, KEY, rows)] == [False, False]
     assert not there.exists()
     assert [got(1, KEY, rows - 1), got(1, KEY, rows - 1)] == [False, True]
+
+
+def test_what_another_process_removes_meanwhile_is_gone(there: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = many(8, there, monkeypatch)
+    listed, remove = os.scandir, kept._removed
+
+    @contextmanager
+    def removed_when_listed(place: Path) -> Iterator[list[os.DirEntry[str]]]:
+        with listed(place) as entries:
+            every = list(entries)
+        (there / f"{known[3]}.scene").unlink()
+        yield every
+
+    def removed_twice(path: str) -> bool:
+        return remove(path) and remove(path)
+
+    monkeypatch.setattr(os, "scandir", removed_when_listed)
+    assert not got(20, f"{20:064x}")
+    monkeypatch.setattr(os, "scandir", listed)
+    assert numbers(there) == [0, 1, 2, 4, 5, 6, 7, 20], "there was room already"
+    monkeypatch.setattr(kept, "_removed", removed_twice)
+    assert not got(21, f"{21:064x}")
+    assert numbers(there) == [1, 2, 4, 5, 6, 7, 20, 21]
 
 
 def test_what_is_not_ours_stays(there: Path, monkeypatch: pytest.MonkeyPatch) -> None:
