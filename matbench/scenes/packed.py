@@ -106,10 +106,7 @@ def _arrays(content: bytes, begin: int, wanted: Sequence[_Array]) -> list[NDArra
     """Arrays of these types and shapes, one after the other, which are all that follows."""
     found = []
     for kind, shape in wanted:
-        count = prod(shape)
-        if count < 0:  # NumPy would take all that is left
-            raise ValueError(f"no array is {shape}")
-        found.append(np.frombuffer(content, kind, count, begin).reshape(shape))
+        found.append(np.frombuffer(content, kind, prod(shape), begin).reshape(shape))
         begin += found[-1].nbytes
     if begin != len(content):
         raise ValueError(f"{len(content) - begin} bytes follow")
