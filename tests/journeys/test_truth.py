@@ -62,7 +62,7 @@ def test_a_scene_that_is_loaded_by_name_brings_no_truth(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not confinement.is_possible(), reason="this system lets nobody mount in a namespace of their own")
-@pytest.mark.parametrize("options", [[], ["--isolation", "shared"], ["--dask", "local"]])
+@pytest.mark.parametrize("options", [["--isolation", "shared"], ["--dask", "local"]])
 def test_kept_scenes_are_out_of_reach(tmp_path: Path, options: list[str]) -> None:
     """Where methods are not confined they are found: so the method looks where they are."""
     cache, wanted = tmp_path / "cache" / "matbench" / "scenes", needles(load_scene(SCENE))
