@@ -65,8 +65,8 @@ class Matching:
         of the pixels' 7x7 census differ, ``census``: rho = 1 - the mean over the two windows of
         min(h, 20) / 20. ``mixed``: rho = 1 - that of 0.35 |dI| / 20 + 0.25 min(|dg|, 10) / 10
         + 0.40 min(h, 20) / 20, |dI| being the mean absolute difference over the colours and dg that
-        of the horizontal gradients of the luma (see `texture`). ``mccnn``: rho = f g, or 0 where that is less, with f and g
-        descriptors of 11x11 pixels by a trained network (`algorithms.mccnn`); it takes
+        of the horizontal gradients of the luma (see `texture`). ``mccnn``: rho = f g, or 0 where that is less, with
+        f and g descriptors of 11x11 pixels by a trained network (`algorithms.mccnn`); it takes
         ``pip install 'matbench-stereo[mccnn]'``.
     window
         Side of the square window in pixels, odd.

@@ -311,8 +311,8 @@ def serve(line: Connection, job: Job, confined: bool) -> None:
         # the keeper's handlers are inherited and are not for methods
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        if confined:
-            confinement.shut_in(job.run, job.settings.memory_each(), kept.folder())
+        if confined and not confinement.shut_in(job.run, job.settings.memory_each(), kept.folder()):
+            raise RuntimeError(f"the method's process could not be shut in; {confinement.UNCONFINED}=1 does without")
         faulthandler.enable(file=2)
         memory.confine(job.settings.memory_each())
         processes.use_threads(job.threads)

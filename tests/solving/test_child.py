@@ -11,6 +11,7 @@ from attrs import evolve
 
 from matbench.plans.plan import Cell, Method
 from matbench.plans.settings import Settings
+from matbench.runs.outcome import Outcome
 from matbench.solving import confinement, intake, processes
 from matbench.solving.child import LOG_ENDS, Child, Log
 from matbench.solving.worker import Job, Message, Order
@@ -101,19 +102,12 @@ def test_a_process_suits_jobs_with_the_same_limits_only(child: tuple[Child, Conn
     assert not made.suits(evolve(JOB, settings=Settings(isolation="shared", memory=64)))
 
 
-@pytest.mark.parametrize("confined", [False, True])
-def test_what_fails_before_the_method_starts_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, confined: bool
-) -> None:
-    def refuse(*_: object) -> None:
-        raise ValueError("No threading layer could be loaded.")
-
-    where, name = (confinement, "shut_in") if confined else (processes, "use_threads")
-    monkeypatch.setattr(where, name, refuse)
+def solved(folder: Path, confined: bool) -> tuple[Outcome, bytes]:
+    """What a cell ends as in a process that does not begin to solve it, and what that process printed."""
     ours, inbox = Pipe()
     made = Child.fork(JOB, inbox, confined)
     try:
-        made.line.send(Order(JOB, tmp_path / "views.npz", tmp_path))
+        made.line.send(Order(JOB, folder / "views.npz", folder))
         assert made.line.poll(60)
         assert made.messages() == [Message("done", is_fit=False)]
         log = Log(made.output)
@@ -123,10 +117,29 @@ def test_what_fails_before_the_method_starts_is_told(
         os.waitpid(made.pid, 0)
         ours.close()
         inbox.close()
-    outcome = intake.outcome(tmp_path)
+    return intake.outcome(folder), log.first
+
+
+@pytest.mark.parametrize("confined", [False, True])
+def test_what_fails_before_the_method_starts_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, confined: bool
+) -> None:
+    def refuse(*_: object) -> None:
+        raise ValueError("No threading layer could be loaded.")
+
+    where, name = (confinement, "shut_in") if confined else (processes, "use_threads")
+    monkeypatch.setattr(where, name, refuse)
+    outcome, printed = solved(tmp_path, confined)
     assert (outcome.status, outcome.reason) == (
         "failed",
         f"ValueError: No threading layer could be loaded. (test_child.py:{refuse.__code__.co_firstlineno + 1})",
     )
-    assert b"Traceback" in log.first
-    assert b"No threading layer could be loaded." in log.first
+    assert b"Traceback" in printed
+    assert b"No threading layer could be loaded." in printed
+
+
+def test_a_method_that_cannot_be_shut_in_does_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(confinement, "shut_in", lambda *_: False)
+    outcome, _ = solved(tmp_path, True)
+    assert outcome.status == "failed"
+    assert "could not be shut in" in outcome.reason
