@@ -3,18 +3,23 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from matbench.algorithms.fusion import ENDED, PRIOR
 from matbench.algorithms.kernels import fill, kernel
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.similarity import Matcher
 
+# What is assumed of a point before any view or pair is asked. It weighs as half of one; a tenth of its rays end there.
+# Without it, one view alone would be as certain as all that agree, and a point that none sees would be 0 / 0.
+PRIOR, ENDED = 0.5, 0.05
+
 
 @kernel
-def _agree(maps, view, spans, fineness, top, end, material):  # type: ignore[no-untyped-def]
+def agree_rows(maps, view, spans, fineness, top, material):  # type: ignore[no-untyped-def]
+    """What `agreement` finds of the rows of `material` (rows, planes, W), of which `top` is the first in the maps."""
     views, _, width = maps.shape
     ended, passing = np.empty(width, np.float32), np.empty(width, np.float32)
     zero, one = np.float32(0), np.float32(1)
-    for y in range(top, end):
+    for row in range(material.shape[0]):
+        y = top + row
         for k in range(material.shape[1]):
             fill(np.float32(ENDED), ended)
             fill(np.float32(PRIOR), passing)
@@ -27,7 +32,7 @@ def _agree(maps, view, spans, fineness, top, end, material):  # type: ignore[no-
                         ended[low + x] += max(one - abs(np.float32(k) - maps[j, y, start + x]), zero)
                         passing[low + x] += one
             for x in range(width):
-                material[y, k, x] = ended[x] / passing[x]
+                material[row, k, x] = ended[x] / passing[x]
 
 
 def agreement(matcher: Matcher, maps: NDArray[np.float32], threads: int = 1) -> NDArray[np.float32]:
@@ -45,7 +50,7 @@ def agreement(matcher: Matcher, maps: NDArray[np.float32], threads: int = 1) -> 
     material = np.empty((space.rows, space.planes, space.width), np.float32)
 
     def ask(top: int, end: int) -> None:
-        _agree(maps, view, spans, space.fineness, top, end, material)
+        agree_rows(maps, view, spans, space.fineness, top, material[top:end])
 
     over_rows(ask, space.rows, threads)
     return material

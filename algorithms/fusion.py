@@ -1,23 +1,19 @@
 """One cost for every pixel and plane of a view, from the similarities of several pairs (equations 13-15)."""
 
-from collections.abc import Callable
-
 import numpy as np
 from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
+from matbench.algorithms.agreement import ENDED, PRIOR, agree_rows
 from matbench.algorithms.kernels import fill, helper, kernel
-from matbench.algorithms.parallel import over_rows, share
 from matbench.algorithms.pixels import weigh_pixels
 from matbench.algorithms.room import Room
 from matbench.algorithms.similarity import FULL, Matcher
+from matbench.algorithms.support import AT_ONCE, Combine, Costs
+from matbench.algorithms.support import support as support
 from matbench.algorithms.windows import Features
 
-# What is assumed of a point before any view or pair is asked. It weighs as half of one; a tenth of its rays end there.
-# Without it, one view alone would be as certain as all that agree, and a point that none sees would be 0 / 0.
-PRIOR, ENDED = 0.5, 0.05
 BLOCK = 128  # columns
-AT_ONCE = 16  # rows: their similarities stay in the cache until they are combined
 
 
 @helper
@@ -171,87 +167,6 @@ def weigh_seen(rho, pairs, maps, view, spans, y0, fineness, hidden, cost, materi
                 material[y, k, x] = ended[x] / reached[x]
 
 
-@kernel
-def charge(material, weight, cost):  # type: ignore[no-untyped-def]
-    """cost += weight (1 - material), in (rows, planes, columns)."""
-    one = np.float32(1)
-    for y in range(cost.shape[0]):
-        for k in range(cost.shape[1]):
-            paid, here = cost[y, k], material[y, k]
-            for x in range(paid.size):
-                paid[x] += weight * (one - here[x])
-
-
-@helper
-def _shares(image, y, radius, fall, share):  # type: ignore[no-untyped-def]
-    """share (window rows, window columns, W) = fall[largest difference over the colours] of the pixels around each.
-
-    They sum to 1; beyond the image they are 0.
-    """
-    height, width, _ = image.shape
-    total = np.zeros(width, np.float32)
-    for dy in range(-radius, radius + 1):
-        for dx in range(-radius, radius + 1):
-            row = share[dy + radius, dx + radius]
-            fill(np.float32(0), row)
-            if not 0 <= y + dy < height:
-                continue
-            for x in range(max(0, -dx), min(width, width - dx)):
-                gap = np.int64(0)
-                for c in range(3):
-                    gap = max(gap, abs(np.int64(image[y + dy, x + dx, c]) - np.int64(image[y, x, c])))
-                row[x] = fall[gap]
-                total[x] += row[x]
-    for dy in range(share.shape[0]):
-        for dx in range(share.shape[1]):
-            row = share[dy, dx]
-            for x in range(width):
-                row[x] /= total[x]
-
-
-@helper
-def _add_share(part, share, total):  # type: ignore[no-untyped-def]
-    """total += share * part."""
-    for x in range(total.size):
-        total[x] += share[x] * part[x]
-
-
-@kernel
-def support(cost, image, first, skipped, fall, radius, out):  # type: ignore[no-untyped-def]
-    """out = weighted mean of the costs around a pixel, as far as its neighbours are of its colour.
-
-    Parameters
-    ----------
-    cost
-        (rows, planes, width): `skipped` rows of the image before those of `out`, and as many after
-        as its window or the image has.
-    first
-        Row of the image that is the first of `out`.
-    image
-        (H, W, 3) uint8 reference view.
-    fall
-        (256,) weight by the largest difference over the colours.
-    out
-        (rows, planes, width), overwritten.
-    """
-    height, width, _ = image.shape
-    share = np.empty((2 * radius + 1, 2 * radius + 1, width), np.float32)
-    for row in range(out.shape[0]):
-        _shares(image, first + row, radius, fall, share)
-        for k in range(out.shape[1]):
-            total = out[row, k]
-            fill(np.float32(0), total)
-            for dy in range(-radius, radius + 1):
-                if not 0 <= first + row + dy < height:
-                    continue
-                part = cost[row + skipped + dy, k]
-                for dx in range(-radius, radius + 1):
-                    left, right = max(0, -dx), max(0, min(width, width - dx))
-                    if left < right:
-                        weight = share[dy + radius, dx + radius]
-                        _add_share(part[left + dx : right + dx], weight[left:right], total[left:right])
-
-
 @frozen
 class Fusion:
     """The fusion of the similarities of several pairs into one cost on the rays of the reference view.
@@ -269,31 +184,22 @@ class Fusion:
     adaptive: float = field(default=10.0, validator=validators.ge(0))
     hidden: float = field(default=0.72, validator=validators.ge(0))
 
-    def first_cost(
-        self, matcher: Matcher, threads: int = 1, phases: Features | None = None, room: Room | None = None
-    ) -> NDArray[np.float32]:
-        """(H, planes, W) 1 - mean of the better half of rho on the reference view's pixel rays.
+    def largest(self, charged: float = 0.0) -> float:
+        """No cost is more than this, with up to `charged` more for what is not material."""
+        return max(1.0, self.hidden) + charged
 
-        It is taken from the `room`, if there is one: the next from there overwrites it.
-        """
-        spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
-        low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
+    def held(self, matcher: Matcher, charged: float = 0.0) -> int:
+        """Bytes of similarities, costs and, if charged, materialities of the rows that one thread works on."""
+        space = matcher.space
+        rows = min(AT_ONCE, space.rows) + 2 * self._reach(matcher)
+        return int(rows) * space.planes * space.width * (len(matcher.pairs) + 4 * (1 + (charged != 0)))
 
-        features = matcher.phases(threads) if phases is None else phases
-
-        def combine(top: int, cost: NDArray[np.float32]) -> None:
-            rho = matcher.rays(features, top, top + len(cost), self._side)
-            better_half(rho, low, high, np.float32(self.hidden), cost)
-
-        return self._cost(matcher, threads, combine, room or Room())
+    def first_cost(self, matcher: Matcher, threads: int = 1, phases: Features | None = None) -> NDArray[np.float32]:
+        """(H, planes, W) 1 - mean of the better half of rho on the reference view's pixel rays."""
+        return self.first(matcher, matcher.phases(threads) if phases is None else phases).real(threads)[0]
 
     def seen_cost(
-        self,
-        matcher: Matcher,
-        maps: NDArray[np.float32],
-        threads: int = 1,
-        phases: Features | None = None,
-        room: Room | None = None,
+        self, matcher: Matcher, maps: NDArray[np.float32], threads: int = 1, phases: Features | None = None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Cost on the reference view's rays from the views that see each point, and the point's materiality.
 
@@ -312,57 +218,62 @@ class Fusion:
 
         Returns
         -------
-        Two (H, planes, W) float32 arrays: the cost and mu. They are taken from the `room`, as those of `first_cost`.
+        Two (H, planes, W) float32 arrays: the cost and mu.
         """
-        space, view = matcher.space, matcher.scene.ref
+        phases = matcher.phases(threads) if phases is None else phases
+        return self.seen(matcher, phases, maps, 0.0).real(threads)
+
+    def first(self, matcher: Matcher, phases: Features) -> Costs:
+        """What `first_cost` gives."""
+        spans = np.stack([matcher.ray_spans(i, j) for i, j in matcher.pairs])
+        low, high = spans[..., 0].copy(), spans[..., 0] + spans[..., 1]
+
+        def combine(top: int, cost: NDArray[np.float32], _: NDArray[np.float32], room: Room) -> None:
+            rho = matcher.rays(phases, top, top + len(cost), self._side, room)
+            better_half(rho, low, high, np.float32(self.hidden), cost)
+
+        return self._averaged(matcher, combine)
+
+    def seen(
+        self,
+        matcher: Matcher,
+        phases: Features,
+        maps: NDArray[np.float32],
+        charged: float,
+        visibility: bool = True,
+    ) -> Costs:
+        """cost + charged (1 - mu) as `seen_cost` gives them; without `visibility`, of `first_cost` and `agreement`."""
+        space, view, hidden = matcher.space, matcher.scene.ref, np.float32(self.hidden)
         spans = np.stack([matcher.ray_spans(view, j) for j in range(space.views)])
-        room = room or Room()
-        material = room.empty("material", (space.rows, space.planes, space.width), np.float32)
 
-        features = matcher.phases(threads) if phases is None else phases
-        side, hidden = self._side, np.float32(self.hidden)
-
-        def pixels(top: int, cost: NDArray[np.float32]) -> None:
-            criterion, part = matcher.pixel_criterion(features), material[top : top + len(cost)]
+        def pixels(top: int, cost: NDArray[np.float32], mu: NDArray[np.float32], _: Room) -> None:
+            criterion = matcher.pixel_criterion(phases)
             prior, ended = np.float32(PRIOR), np.float32(ENDED)
-            weigh_pixels(features, maps, view, *criterion, spans, space.fineness, top, prior, ended, hidden, cost, part)
+            weigh_pixels(phases, maps, view, *criterion, spans, space.fineness, top, prior, ended, hidden, cost, mu)
 
-        def windows(top: int, cost: NDArray[np.float32]) -> None:
-            rho, part = matcher.rays(features, top, top + len(cost), side), material[top : top + len(cost)]
-            weigh_seen(rho, matcher.pairs, maps, view, spans, top, space.fineness, hidden, cost, part)
+        def windows(top: int, cost: NDArray[np.float32], mu: NDArray[np.float32], room: Room) -> None:
+            rho = matcher.rays(phases, top, top + len(cost), self._side, room)
+            weigh_seen(rho, matcher.pairs, maps, view, spans, top, space.fineness, hidden, cost, mu)
 
-        alone = matcher.by_pixels(side) and matcher.settings.pairs == "reference"
-        return self._cost(matcher, threads, pixels if alone else windows, room), material
+        if visibility:
+            alone = matcher.by_pixels(self._side) and matcher.settings.pairs == "reference"
+            return self._averaged(matcher, pixels if alone else windows, charged, solid=True)
+        first = self.first(matcher, phases)
+
+        def agreeing(top: int, cost: NDArray[np.float32], mu: NDArray[np.float32], room: Room) -> None:
+            first.combine(top, cost, mu, room)
+            agree_rows(maps, view, spans, space.fineness, top, mu)
+
+        return self._averaged(matcher, agreeing, charged, solid=True)
 
     @property
     def _side(self) -> int | None:
         """Of the windows that are compared, if it is not that of the settings."""
         return 1 if self.adaptive else None
 
-    def _cost(
-        self, matcher: Matcher, threads: int, combine: Callable[[int, NDArray[np.float32]], None], room: Room
-    ) -> NDArray[np.float32]:
-        """Find costs some rows at a time, by ``combine(first row, cost)``, and average them.
-
-        Similarities are not kept: of all rows they would take too much memory.
-        """
-        space, image = matcher.space, matcher.scene.views[matcher.scene.ref]
-        radius = matcher.settings.window // 2 if self.adaptive else 0
+    def _averaged(self, matcher: Matcher, combine: Combine, charged: float = 0.0, solid: bool = False) -> Costs:
         fall = np.exp(np.arange(256) / -(self.adaptive or np.inf)).astype(np.float32)
-        cost: NDArray[np.float32] = room.empty("cost", (space.rows, space.planes, space.width), np.float32)
+        return Costs(matcher, combine, self._reach(matcher), fall, charged, solid)
 
-        def fill_rows(first: int, end: int) -> None:
-            top, bottom = max(0, first - radius), min(space.rows, end + radius)
-            part = np.empty((bottom - top, *cost.shape[1:]), np.float32) if radius else cost[first:end]
-            ready = top
-            for begin in range(first, end, AT_ONCE):
-                stop = min(end, begin + AT_ONCE)
-                before, after = max(0, begin - radius), min(space.rows, stop + radius)
-                combine(ready, part[ready - top : after - top])
-                ready = after
-                if radius:
-                    around = part[before - top : after - top]
-                    support(around, image, begin, begin - before, fall, radius, cost[begin:stop])
-
-        over_rows(fill_rows, space.rows, threads, min(share(space.rows, threads), 4 * AT_ONCE))
-        return cost
+    def _reach(self, matcher: Matcher) -> int:
+        return matcher.settings.window // 2 if self.adaptive else 0

@@ -6,14 +6,14 @@ import numpy as np
 from attrs import field, frozen, validators
 from numpy.typing import NDArray
 
-from matbench.algorithms.agreement import agreement
-from matbench.algorithms.fusion import Fusion, charge
+from matbench.algorithms.fusion import Fusion
 from matbench.algorithms.mending import mend
 from matbench.algorithms.outlines import outlined
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.room import Room
 from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import Matcher, Matching
+from matbench.algorithms.support import Costs
 from matbench.algorithms.surfaces import smoothed
 from matbench.algorithms.windows import Features
 
@@ -41,10 +41,11 @@ class Inference:
         """Parameter -> what it needs to have an effect, for those without effect at this window size."""
         return {"adaptive": "window above 1"} if matching.window == 1 else {}
 
-    @staticmethod
-    def volume_bytes(matcher: Matcher, refined: bool) -> int:
-        """Bytes held at once: costs, twice as much while paths are summed and, for `refined` maps, materialities."""
-        return (4 if refined else 3) * matcher.ray_bytes
+    def volume_bytes(self, matcher: Matcher, charged: float = 0.0) -> int:
+        """Bytes of what has planes and is held at once, on one thread; with `charged` for maps that are refined."""
+        shape = matcher.space.rows, matcher.space.planes, matcher.space.width
+        costs = self.semiglobal.paths(self.fusion.largest(charged)).held(shape)
+        return costs + self.fusion.held(matcher, charged)
 
     @staticmethod
     def comparisons(matcher: Matcher) -> int:
@@ -66,8 +67,8 @@ class Inference:
             and outlines, which move answers after that, leave it as it is.
         """
 
-        def cost(one: Matcher, phases: Features, room: Room) -> NDArray[np.float32]:
-            return self.fusion.first_cost(one, threads, phases, room)
+        def cost(one: Matcher, phases: Features) -> Costs:
+            return self.fusion.first(one, phases)
 
         maps, sure, _ = self._maps(matcher, cost, threads, ratios)
         return self._on_surfaces(matcher, maps, sure, threads) if self.surfaces else maps
@@ -93,15 +94,10 @@ class Inference:
         and of the new maps before they are mended.
         """
 
-        def cost(one: Matcher, phases: Features, room: Room) -> NDArray[np.float32]:
-            if visibility:
-                least, mu = self.fusion.seen_cost(one, maps, threads, phases, room)
-            else:
-                least, mu = self.fusion.first_cost(one, threads, phases, room), agreement(one, maps, threads)
-            over_rows(lambda top, end: charge(mu[top:end], np.float32(material), least[top:end]), len(mu), threads)
-            return least
+        def cost(one: Matcher, phases: Features) -> Costs:
+            return self.fusion.seen(one, phases, maps, material, visibility)
 
-        found, sure, energies = self._maps(matcher, cost, threads, ratios, maps)
+        found, sure, energies = self._maps(matcher, cost, threads, ratios, maps, material)
         if self.surfaces:
             found = self._on_surfaces(matcher, found, sure, threads, mended=False)
         before, after = energies.mean(axis=0)
@@ -110,10 +106,11 @@ class Inference:
     def _maps(
         self,
         matcher: Matcher,
-        cost: Callable[[Matcher, Features, Room], NDArray[np.float32]],
+        cost: Callable[[Matcher, Features], Costs],
         threads: int,
         ratios: NDArray[np.float32] | None,
         known: NDArray[np.float32] | None = None,
+        charged: float = 0.0,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]:
         """Mended maps of all views, how sure they are, and the energies of the `known` maps and of the new ones.
 
@@ -124,16 +121,21 @@ class Inference:
         maps = np.empty((space.views, space.rows, space.width), np.float32)
         sure = np.empty_like(maps) if self.surfaces else maps[:0]
         energies = np.zeros((space.views, 2))
+        # kept as whole numbers only: real ones would take twice the memory, and as much again while they are counted
+        paths = self.semiglobal.paths(self.fusion.largest(charged))
+        paid = room.empty("paid", paths.wide((space.rows, space.planes, space.width)), paths.kind)
         for view, image in enumerate(scene.views):
-            paid = cost(matcher.with_reference(view), phases, room)
+            cost(matcher.with_reference(view), phases).whole(paths.unit, paid, room, threads)
             asked = self.surfaces or (ratios is not None and view == scene.ref)
-            maps[view], found = self.semiglobal.infer_surely(paid, image, threads, asked, room)
+            maps[view], found = self.semiglobal.infer_whole(paid, paths, image, room, threads, asked)
             if found is not None and ratios is not None and view == scene.ref:
                 ratios[:] = found
             if found is not None and self.surfaces:
                 sure[view] = found
             if known is not None:
-                energies[view] = [self.semiglobal.energy(paid, image, of) for of in (known[view], maps[view])]
+                energies[view] = [
+                    self.semiglobal.energy(paid, image, of, paths.unit, threads) for of in (known[view], maps[view])
+                ]
         steps = (maps + np.float32(space.first)) / np.float32(space.fineness)
         mended = mend(steps, scene.views, 1 / scene.pair_steps, self.mending, threads)
         planes = np.asarray(mended * np.float32(space.fineness) - np.float32(space.first), np.float32)

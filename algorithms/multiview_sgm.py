@@ -34,7 +34,7 @@ class MultiviewSGM:
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """The reference view's map, with an answer everywhere."""
-        matcher = Matcher.of(scene, self.matching, context.threads)
+        matcher = Matcher.of(scene, self.matching, context.threads).on_rays(context.threads)
         sure = np.empty((scene.height, scene.width), np.float32)
         maps = self.inference.initial_maps(matcher, context.threads, sure)
         return Estimate(
@@ -42,6 +42,6 @@ class MultiviewSGM:
             confidence={scene.ref: sure},
             work={
                 "pair_similarities": self.inference.comparisons(matcher),
-                "volume_bytes": self.inference.volume_bytes(matcher, refined=False),
+                "volume_bytes": self.inference.volume_bytes(matcher),
             },
         )

@@ -177,13 +177,12 @@ def weigh_pixels(  # type: ignore[no-untyped-def]
     spans
         (views, planes, 6) as there; row `view` is not read.
     prior, ended_before
-        What is assumed before any view is asked: `fusion.PRIOR` and `fusion.ENDED`.
+        What is assumed before any view is asked: `agreement.PRIOR` and `agreement.ENDED`.
     """
     views, _, width = maps.shape
     samples = features.rows.shape[4]
     differing, compared = np.zeros(samples, np.uint8), np.zeros(samples, np.uint8)
     order, similar = np.zeros(samples, np.uint16), np.zeros(samples, np.uint8)
-    # rows of `material` at the seam of two threads are found by both: each adds up by itself, and both write the same
     reached, ended = np.empty(width, np.float32), np.empty(width, np.float32)
     least = np.empty((views, (width + PIXELS - 1) // PIXELS), np.float32)
     for y in range(cost.shape[0]):

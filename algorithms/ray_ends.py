@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from matbench.algorithms.fusion import ENDED, PRIOR, sight
+from matbench.algorithms.agreement import ENDED, PRIOR
+from matbench.algorithms.fusion import sight
 from matbench.algorithms.kernels import fill, kernel
 from matbench.algorithms.mending import count_votes
 from matbench.algorithms.parallel import over_rows

@@ -10,6 +10,7 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from matbench.algorithms.features import whole
 from matbench.algorithms.kernels import kernel, literal
 from matbench.algorithms.parallel import over_rows
 from matbench.scene import SAME_PLACE, Scene
@@ -69,7 +70,9 @@ def fine_rows(images: NDArray[np.uint8], fineness: int, threads: int = 1) -> NDA
     return fine
 
 
-def by_phase(values: NDArray[np.generic], fineness: int, spare: int = 0, threads: int = 1) -> NDArray[np.generic]:
+def by_phase(
+    values: NDArray[np.generic], fineness: int, spare: int = 0, threads: int = 1, shift: float | None = None
+) -> NDArray[np.generic]:
     """Sort finely sampled rows by their phase within a pixel, so that samples a pixel apart lie side by side.
 
     Parameters
@@ -80,6 +83,8 @@ def by_phase(values: NDArray[np.generic], fineness: int, spare: int = 0, threads
         q.
     spare
         Columns of 0 after the last pixel.
+    shift
+        If it is given, samples become `whole` numbers, with that shift.
 
     Returns
     -------
@@ -87,11 +92,14 @@ def by_phase(values: NDArray[np.generic], fineness: int, spare: int = 0, threads
     beyond the last pixel.
     """
     width = (values.shape[-1] - 1) // fineness + 1
-    out = np.zeros((values.shape[0], fineness, *values.shape[1:-1], width + spare), values.dtype)
+    kind = values.dtype if shift is None else np.uint16
+    out = np.zeros((values.shape[0], fineness, *values.shape[1:-1], width + spare), kind)
 
     def sort(view: int, _: int) -> None:
+        # one view at a time: whole numbers of all views would take as much memory again
+        one = values[view] if shift is None else whole(values[view : view + 1], shift)[0]  # type: ignore[arg-type]
         for phase in range(fineness):
-            part = values[view, ..., phase::fineness]
+            part = one[..., phase::fineness]
             out[view, phase, ..., : part.shape[-1]] = part
 
     over_rows(sort, len(values), threads, 1)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import combinations, pairwise
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from attrs import evolve, field, frozen, validators
@@ -14,6 +14,7 @@ from matbench.algorithms.features import SHIFTS, census, gradient, luma, same_su
 from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.parameters import all_or_several, odd, planes_a_pixel, unread
 from matbench.algorithms.pixels import PIXELS, compare_pixels, most_costly
+from matbench.algorithms.room import Room
 from matbench.algorithms.sampling import by_phase, fine_rows, search_space
 from matbench.algorithms.windows import (
     CENSUS,
@@ -141,6 +142,8 @@ class Matcher:
         (views, H, samples, 64) int8, as `mccnn.descriptors` gives them; H is 0 if the similarity does not use them.
     settings
         How windows are compared.
+    ready
+        What `phases` gives, if nothing else is kept (`on_rays`).
     """
 
     scene: Scene
@@ -153,6 +156,7 @@ class Matcher:
     masks: NDArray[np.uint8]
     descriptors: NDArray[np.int8]
     settings: Matching
+    ready: Features | None = None
 
     @classmethod
     def of(cls, scene: Scene, settings: Matching, threads: int = 1) -> "Matcher":
@@ -181,6 +185,12 @@ class Matcher:
         """The same views with another reference view; with ``reference`` pairs, the pairs change with it."""
         scene = evolve(self.scene, ref=view, regions={})
         return evolve(self, scene=scene, pairs=pairs(self.space.views, self.settings.pairs, view))
+
+    def on_rays(self, threads: int = 1) -> "Matcher":
+        """The same for `rays` alone: features are sorted once, and others are not kept."""
+        ready, none = self.phases(threads), np.zeros((self.space.views, 0, 0, 0), np.uint8)
+        rows = np.zeros((self.space.views, self.rows.shape[1], 0, 0), np.float32)
+        return evolve(self, ready=ready, rows=rows, slopes=rows[:, 0], bits=none, masks=none)
 
     @property
     def step(self) -> int:
@@ -262,7 +272,9 @@ class Matcher:
         self._fill(first, out)
         return out
 
-    def rays(self, phases: Features, first: int, end: int, window: int | None = None) -> NDArray[np.uint8]:
+    def rays(
+        self, phases: Features, first: int, end: int, window: int | None = None, room: Room | None = None
+    ) -> NDArray[np.uint8]:
         """(end - first, pairs, planes, width) what `block` holds at the whole pixels of the reference view.
 
         Here windows end where the reference image does, too.
@@ -273,14 +285,16 @@ class Matcher:
             From the method of that name: they serve every reference view and all rows.
         window
             Side of the window in pixels, if it is not that of the settings.
+        room
+            Where the array is taken from: the next from there overwrites it.
         """
         space = self.space
         shape = end - first, len(self.pairs), space.planes, space.width
+        out = (room or Room()).empty("rho", shape, np.uint8)
         if self.by_pixels(window):
-            out = np.empty(shape, np.uint8)
             compare_pixels(phases, self.pairs, *self.pixel_criterion(phases), self._stacked_ray_spans, first, out)
         else:
-            out = np.zeros(shape, np.uint8)
+            out.fill(0)
             self._compare(phases, first, out, on_rays=True, window=window)
         return out
 
@@ -302,9 +316,15 @@ class Matcher:
 
     def phases(self, threads: int = 1) -> Features:
         """Rows and their features sorted by phase within a pixel, so that every q-th sample is read contiguously."""
-        spare = PIXELS if self.settings.similarity == "mixed" else 0
-        parts = (by_phase(part, self.space.fineness, spare, threads) for part in self._compared)
-        return Features(*parts, self.descriptors)  # type: ignore[call-arg, arg-type]
+        if self.ready is not None:
+            return self.ready
+        mixed = self.settings.similarity == "mixed"
+
+        def sort(values: NDArray[Any], shift: float | None = None) -> NDArray[Any]:
+            return by_phase(values, self.space.fineness, PIXELS if mixed else 0, threads, shift)
+
+        rows, slopes = sort(self.rows, SHIFTS[0] if mixed else None), sort(self.slopes, SHIFTS[1])
+        return Features(rows, slopes, sort(self.bits), sort(self.masks), self.descriptors)
 
     def _fill(self, first: int, out: NDArray[np.uint8]) -> None:
         unsorted = Features(*(part[:, None] for part in self._compared), self.descriptors)  # type: ignore[call-arg, arg-type]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from matbench.algorithms.fusion import ENDED, PRIOR
+from matbench.algorithms.agreement import ENDED, PRIOR
 from matbench.algorithms.kernels import helper, kernel
 from matbench.algorithms.parallel import over_rows
 from matbench.space import DisparitySpace

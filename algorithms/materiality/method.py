@@ -88,8 +88,8 @@ class Materiality:
 
     def solve(self, scene: Scene, context: Context) -> Estimate:
         """The reference view's map, the materialities, and the history of the passes."""
-        matcher = Matcher.of(scene, self.matching, context.threads)
-        return self._descent(matcher, context) if self.solver.descends else self._fixed_point(matcher, context)
+        solve = self._descent if self.solver.descends else self._fixed_point
+        return solve(Matcher.of(scene, self.matching, context.threads), context)  # no name here: it is given up there
 
     def _fixed_point(self, matcher: Matcher, context: Context) -> Estimate:
         space, threads, probe = matcher.space, context.threads, context.probe
@@ -97,17 +97,20 @@ class Materiality:
             self._tell_similarities(matcher, matcher.all(threads), probe)
         solver, inference = self.solver, self.inference
         every = inference.comparisons(matcher)
+        inferring = inference.volume_bytes(matcher, solver.material if solver.passes else 0.0)
         ratios = np.ones((space.rows, space.width), np.float32)
         history: dict[str, list[float]] = {"changed": [], "energy_before": [], "energy": []}
         if solver.start == "consensus":
+            matcher = matcher.on_rays(threads)  # other features make room
             maps, compared = inference.initial_maps(matcher, threads, ratios), every
-            held = inference.volume_bytes(matcher, refined=solver.passes > 0)
+            held = inferring
         else:
             compared = matcher.comparisons
             rho = matcher.all(threads)
             mu = start(matcher, rho, solver.start == "soft", solver.sharpness, threads)
-            held = mu.nbytes + max(rho.nbytes, inference.volume_bytes(matcher, refined=True) if solver.passes else 0)
+            held = mu.nbytes + max(rho.nbytes, inferring if solver.passes else 0)
             del rho
+            matcher = matcher.on_rays(threads)
             maps = self._rays_end(mu, space, threads)
         for number in range(solver.passes):
             found, *energies = inference.refined_maps(
@@ -170,11 +173,14 @@ class Materiality:
         descent = Descent(solver.passes, solver.optimiser == "fista", energy.safe_step, solver.tolerance, threads)
         mu, history, passes, updates = descent.run(energy, mu, tell if probe.active else None)
         fixed = rho.nbytes + mu.nbytes + sum(weights.nbytes for weights in energy.weights)
-        infers = solver.binarization in ("volume", "maps")
         compared += self.inference.comparisons(matcher) if solver.binarization == "maps" else 0
         answer = self._infer(matcher, mu, rho, threads)
         sure = seen_near(seen_rays(mu, space, matcher.scene.ref, threads), answer, threads)
-        inferring = self.inference.volume_bytes(matcher, refined=True) if infers else 0
+        shape = space.rows, space.planes, space.width
+        inferring = {  # a volume's costs and materialities are real numbers of all rows, and whole ones as well
+            "maps": self.inference.volume_bytes(matcher, solver.material),
+            "volume": 2 * matcher.ray_bytes + self.inference.semiglobal.paths(1.0).held(shape),
+        }
         return Estimate(
             disparity={self._reference(matcher): matcher.disparity(answer)},
             confidence={self._reference(matcher): sure},
@@ -184,7 +190,7 @@ class Materiality:
                 "passes": passes,
                 "point_updates": updates,
                 "pair_similarities": compared,
-                "volume_bytes": fixed + max(mu.nbytes, inferring),
+                "volume_bytes": fixed + max(mu.nbytes, inferring.get(solver.binarization, 0)),
             },
         )
 

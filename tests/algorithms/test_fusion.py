@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from window_means import supported
 
-from matbench.algorithms.fusion import Fusion, better_half, charge, support
+from matbench.algorithms.fusion import Fusion, better_half
 from matbench.algorithms.similarity import Matcher, Matching
 from matbench.scene import Range, Scene
 
@@ -36,19 +37,6 @@ def both_see(matcher):
     for view, k in np.ndindex(inside.shape[:2]):
         inside[view, k, space.frustum(view, k)] = True
     return np.stack([inside[i] & inside[j] for i, j in matcher.pairs])
-
-
-def supported(cost, image, radius, adaptive):
-    """sum w cost / sum w over the window within the image, w = exp(-largest colour difference / adaptive)."""
-    out = np.empty(cost.shape)
-    height, _, width = cost.shape
-    for y, x in np.ndindex(height, width):
-        rows = slice(max(0, y - radius), y + radius + 1)
-        columns = slice(max(0, x - radius), x + radius + 1)
-        gap = np.abs(image[rows, columns].astype(float) - image[y, x]).max(axis=2)
-        weight = np.exp(-gap / adaptive)
-        out[y, :, x] = (weight[:, None] * cost[rows, :, columns]).sum(axis=(0, 2)) / weight.sum()
-    return out
 
 
 def seen(matcher, maps, view, j, k, x):
@@ -158,36 +146,6 @@ def test_seen_cost_is_its_equation(n, height, width, least, extent, fineness, wh
         np.testing.assert_array_equal(second, first)
 
 
-@settings(max_examples=20, deadline=None)
-@given(
-    shape=st.tuples(st.integers(1, 6), st.integers(1, 4), st.integers(1, 6)),
-    radius=st.integers(0, 2),
-    adaptive=st.sampled_from([2.0, 30.0, 1e6]),
-    seed=st.integers(0, 999),
-)
-def test_support_is_a_weighted_mean_of_the_window(shape, radius, adaptive, seed):
-    rng = np.random.default_rng(seed)
-    cost, image = rng.random(shape, np.float32), rng.integers(0, 256, (*shape[::2], 3), dtype=np.uint8)
-    fall = np.exp(-np.arange(256) / adaptive).astype(np.float32)
-    expected = supported(cost, image, radius, adaptive)
-    first = int(rng.integers(shape[0]))
-    end = int(rng.integers(first, shape[0])) + 1
-    top, bottom = max(0, first - radius), min(shape[0], end + radius)
-    out = np.full((end - first, *shape[1:]), np.nan, np.float32)
-    support(cost[top:bottom].copy(), image, first, first - top, fall, radius, out)
-    np.testing.assert_allclose(out, expected[first:end], atol=1e-6)
-
-
-def test_support_stays_on_its_side_of_an_edge():
-    image = np.zeros((5, 8, 3), np.uint8)
-    image[:, 4:, 1] = 200
-    cost = np.broadcast_to(np.arange(8) >= 4, (5, 1, 8)).astype(np.float32)
-    fall = np.exp(-np.arange(256) / 10).astype(np.float32)
-    out = np.empty_like(cost)
-    support(cost, image, 0, 0, fall, 2, out)
-    np.testing.assert_allclose(out, cost, atol=1e-6)
-
-
 def test_a_view_that_ends_before_a_point_says_nothing_about_it():
     matcher = random_matcher(3, 2, 9, 0, 4, pairs="reference", fineness=1, window=1)
     fusion = Fusion(adaptive=0, hidden=0.4)
@@ -214,14 +172,6 @@ def test_another_reference_view_is_in_every_pair(view):
 def test_a_wrong_value_names_the_parameter(name):
     with pytest.raises(ValueError, match=name):
         Fusion(**{name: -1.0})
-
-
-def test_what_is_not_material_is_charged():
-    rng = np.random.default_rng(0)
-    cost, mu = rng.random((2, 3, 4, 21), np.float32)
-    expected = cost + 0.25 * (1 - mu.astype(float))
-    charge(mu, np.float32(0.25), cost)
-    np.testing.assert_allclose(cost, expected, atol=1e-6)
 
 
 def test_threads_that_find_the_same_rows_do_not_disturb_one_another():

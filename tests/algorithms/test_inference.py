@@ -38,19 +38,23 @@ def test_every_view_is_inferred_from_costs_on_its_own_rays(fineness, pair_steps,
     semiglobal, scene = SemiGlobal(large_step=0.5), matcher.scene
     inference = Inference(semiglobal=semiglobal, mending=rounds, surfaces=False)
     views = [matcher.with_reference(view) for view in range(scene.n)]
-    first = [semiglobal.infer(Fusion().first_cost(one), scene.views[view]) for view, one in enumerate(views)]
+    first = [
+        semiglobal.infer(Fusion().first_cost(one), scene.views[view], largest=Fusion().largest())
+        for view, one in enumerate(views)
+    ]
     expected = mended(matcher, np.stack(first), rounds)
     for threads in (1, 2):
         maps = inference.initial_maps(matcher, threads)
         np.testing.assert_allclose(maps, expected, atol=1e-5)
         assert maps.dtype == np.float32
 
-    second, energies = [], []
+    second, energies, unit = [], [], semiglobal.paths(Fusion().largest(0.4)).unit
     for view, one in enumerate(views):
         cost, mu = Fusion().seen_cost(one, maps)
         cost += np.float32(0.4) * (1 - mu)
-        second.append(semiglobal.infer(cost, scene.views[view]))
-        energies.append([semiglobal.energy(cost, scene.views[view], planes) for planes in (maps[view], second[-1])])
+        second.append(semiglobal.infer(cost, scene.views[view], largest=Fusion().largest(0.4)))
+        rounded = np.floor(cost * np.float32(unit) + np.float32(0.5)) / unit
+        energies.append([semiglobal.energy(rounded, scene.views[view], planes) for planes in (maps[view], second[-1])])
     expected = mended(matcher, np.stack(second), rounds)
     for threads in (1, 2):
         again, *told = inference.refined_maps(matcher, maps, 0.4, threads)

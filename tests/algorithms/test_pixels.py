@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neighbours import random_scene
 
-from matbench.algorithms.fusion import ENDED, PRIOR, weigh_seen
+from matbench.algorithms.agreement import ENDED, PRIOR
+from matbench.algorithms.fusion import weigh_seen
 from matbench.algorithms.pixels import most_costly, weigh_pixels
 from matbench.algorithms.similarity import Matcher, Matching
 

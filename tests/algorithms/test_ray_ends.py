@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from matbench.algorithms.fusion import ENDED, PRIOR
+from matbench.algorithms.agreement import ENDED, PRIOR
 from matbench.algorithms.materiality.binarize import seen_rays
 from matbench.algorithms.materiality.consensus import consensus
 from matbench.algorithms.ray_ends import agreement, rays_end_near, seen_near

@@ -25,6 +25,19 @@ def test_comparisons_counts_points_in_both_frusta():
     assert matcher.comparisons == 2 * sum((inside[i] & inside[j]).sum() for i, j in matcher.pairs)
 
 
+@pytest.mark.parametrize("similarity", ["mixed", "ssd"])
+@pytest.mark.parametrize("window", [1, 3])
+def test_what_is_kept_for_rays_gives_the_same(similarity, window):
+    matcher = Matcher.of(
+        random_scene(3, 5, 9, -1, 2), Matching(views=3, fineness=2, similarity=similarity, window=window)
+    )
+    kept = matcher.on_rays(2).with_reference(2)
+    rho = matcher.with_reference(2).rays(matcher.phases(), 0, 5)
+    np.testing.assert_array_equal(kept.rays(kept.phases(), 0, 5), rho)
+    assert kept.ray_comparisons == matcher.with_reference(2).ray_comparisons
+    assert kept.rows.nbytes + kept.slopes.nbytes + kept.bits.nbytes + kept.masks.nbytes == 0
+
+
 def test_pairs():
     assert pairs(4, "consecutive").tolist() == [[0, 1], [1, 2], [2, 3]]
     assert pairs(3, "all").tolist() == [[0, 1], [0, 2], [1, 2]]

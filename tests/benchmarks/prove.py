@@ -45,11 +45,12 @@ def _again(rows: str) -> str:
 PLANTS = (
     Plant(
         "semi-global",
-        "algorithms/semiglobal.py",
+        "algorithms/paths.py",
         (
             (
-                "    for row in range(rows):\n        y, y_old",
-                f"    for turn in {_again('rows')}:\n        row = turn % rows\n        y, y_old",
+                "    for row in range(first, end):\n        y, y_old",
+                f"    for turn in {_again('(end - first)')}:\n        row = first + turn % (end - first)\n"
+                "        y, y_old",
             ),
         ),
     ),
@@ -65,7 +66,7 @@ PLANTS = (
     ),
     Plant(
         "support",
-        "algorithms/fusion.py",
+        "algorithms/support.py",
         (
             (
                 "    for row in range(out.shape[0]):\n        _shares",
