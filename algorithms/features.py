@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import helper, kernel
-from matbench.algorithms.parallel import over_rows
+from matbench.algorithms.parallel import over_rows, over_views
 
 CENSUS_RADIUS = 3  # 7x7 pixels
 CENSUS_BITS = (2 * CENSUS_RADIUS + 1) ** 2 - 1
@@ -18,17 +18,29 @@ AROUND = 2  # pixels to either side in which slopes are alike weak or strong
 WEAKEST = 0.2  # grey levels: what hardly slopes at all is noise
 
 
-def luma(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+def luma(rows: NDArray[np.float32], threads: int = 1) -> NDArray[np.float32]:
     """(views, H, samples) brightness of (views, 3, H, samples) rows, in grey levels."""
     red, green, blue = (np.float32(weight) for weight in LUMA)
-    return np.asarray(red * rows[:, 0] + green * rows[:, 1] + blue * rows[:, 2], np.float32)
+    out = np.empty((len(rows), *rows.shape[2:]), np.float32)
+
+    def weigh(view: int, top: int, end: int) -> None:
+        r, g, b = rows[view, :, top:end]
+        out[view, top:end] = red * r + green * g + blue * b
+
+    over_views(weigh, len(out), out.shape[1], threads)
+    return out
 
 
-def gradient(grey: NDArray[np.float32], fineness: int) -> NDArray[np.float32]:
+def gradient(grey: NDArray[np.float32], fineness: int, threads: int = 1) -> NDArray[np.float32]:
     """Half the difference of the samples one pixel to the right and to the left; the edge's sample repeats beyond."""
-    q = fineness
-    wide = np.concatenate([np.repeat(grey[..., :1], q, -1), grey, np.repeat(grey[..., -1:], q, -1)], axis=-1)
-    return np.asarray((wide[..., 2 * q :] - wide[..., : -2 * q]) * np.float32(0.5), np.float32)
+    out = np.empty_like(grey)
+
+    def differ(view: int, top: int, end: int) -> None:
+        wide = np.pad(grey[view, top:end], ((0, 0), (fineness, fineness)), mode="edge")
+        out[view, top:end] = (wide[:, 2 * fineness :] - wide[:, : -2 * fineness]) * np.float32(0.5)
+
+    over_views(differ, len(grey), grey.shape[1], threads)
+    return out
 
 
 def strengthened(slopes: NDArray[np.float32], fineness: int, texture: float, threads: int = 1) -> NDArray[np.float32]:
@@ -83,14 +95,15 @@ def _mark_darker(taps, centre, bits):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _census(wide, fineness, bits):  # type: ignore[no-untyped-def]
+def _census(wide, before, top, end, fineness, bits):  # type: ignore[no-untyped-def]
+    """Rows top..end of a view; `wide` has rows from `before` on, as many as their windows reach."""
     _, height, samples = bits.shape
-    for y in range(height):
+    for y in range(top, end):
         number = 0
         for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
-            row = wide[min(max(y + dy, 0), height - 1)]
+            row = wide[min(max(y + dy, 0), height - 1) - before]
             middle = CENSUS_RADIUS * fineness
-            centre = wide[y, middle : middle + samples]
+            centre = wide[y - before, middle : middle + samples]
             for dx in range(2 * CENSUS_RADIUS + 1):
                 if dy != 0 or dx != CENSUS_RADIUS:
                     taps = row[dx * fineness : dx * fineness + samples]
@@ -107,10 +120,13 @@ def census(grey: NDArray[np.float32], fineness: int, threads: int = 1) -> NDArra
     reach = CENSUS_RADIUS * fineness
     bits = np.zeros((len(grey), CENSUS_WORDS, *grey.shape[1:]), np.uint8)
 
-    def mark(view: int, _: int) -> None:
-        _census(np.pad(grey[view], ((0, 0), (reach, reach)), mode="edge"), fineness, bits[view])
+    def mark(view: int, top: int, end: int) -> None:
+        before = max(0, top - CENSUS_RADIUS)
+        around = grey[view, before : end + CENSUS_RADIUS]
+        wide = np.pad(around, ((0, 0), (reach, reach)), mode="edge")
+        _census(wide, before, top, end, fineness, bits[view])
 
-    over_rows(mark, len(bits), threads, 1)
+    over_views(mark, len(grey), grey.shape[1], threads)
     return bits
 
 
@@ -128,19 +144,20 @@ def _mark_alike(wide, row, other, first, start, most, channels, bits):  # type: 
 
 
 @kernel
-def _mark_same_surface(wide, fineness, most, channels, bits):  # type: ignore[no-untyped-def]
+def _mark_same_surface(wide, before, top, end, fineness, most, channels, bits):  # type: ignore[no-untyped-def]
+    """Rows top..end of a view; `wide` has rows from `before` on, as many as their windows reach."""
     height = bits.shape[1]
     middle, any_gap = CENSUS_RADIUS * fineness, np.uint16(65535)
-    for y in range(height):
+    for y in range(top, end):
         number = 0
         for dy in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
-            other = min(max(y + dy, 0), height - 1)
+            other = min(max(y + dy, 0), height - 1) - before
             for dx in range(-CENSUS_RADIUS, CENSUS_RADIUS + 1):
                 if dy == 0 and dx == 0:
                     continue
                 limit = any_gap if abs(dx) <= 1 and abs(dy) <= 1 else most
                 start = middle + dx * fineness
-                _mark_alike(wide, y, other, middle, start, limit, channels, bits[number // WORD, y])
+                _mark_alike(wide, y - before, other, middle, start, limit, channels, bits[number // WORD, y])
                 number += 1
 
 
@@ -160,9 +177,11 @@ def same_surface(rows: NDArray[np.float32], fineness: int, most: float, threads:
     bits = np.zeros((len(rows), CENSUS_WORDS, *rows.shape[2:]), np.uint8)
     limit, channels = np.uint16(min(round(most * UNITS), 65535)), (0,) * rows.shape[1]
 
-    def mark(view: int, _: int) -> None:
-        wide = np.pad(whole(rows[view], SHIFTS[0]), ((0, 0), (0, 0), (reach, reach)), mode="edge")
-        _mark_same_surface(wide, fineness, limit, channels, bits[view])
+    def mark(view: int, top: int, end: int) -> None:
+        before = max(0, top - CENSUS_RADIUS)
+        around = whole(rows[view, :, before : end + CENSUS_RADIUS], SHIFTS[0])
+        wide = np.pad(around, ((0, 0), (0, 0), (reach, reach)), mode="edge")
+        _mark_same_surface(wide, before, top, end, fineness, limit, channels, bits[view])
 
-    over_rows(mark, len(bits), threads, 1)
+    over_views(mark, len(rows), rows.shape[2], threads)
     return bits

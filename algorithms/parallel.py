@@ -10,6 +10,13 @@ def share(rows: int, threads: int) -> int:
     return max(1, rows if threads <= 1 else -(-rows // (8 * threads)))
 
 
+def over_views(work: Callable[[int, int, int], None], views: int, rows: int, threads: int) -> None:
+    """Call ``work(view, first, end)`` for parts of `range(rows)` in each view: as many for every thread."""
+    each = max(1, -(-rows // max(1, threads)))
+    parts = [(view, first, min(first + each, rows)) for view in range(views) for first in range(0, rows, each)]
+    over_rows(lambda number, _: work(*parts[number]), len(parts), threads, 1)
+
+
 def over_rows(work: Callable[[int, int], None], rows: int, threads: int, block: int = 16) -> None:
     """Call ``work(first, end)`` for blocks that cover ``range(rows)``, on `threads` threads.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from matbench.algorithms.features import whole
 from matbench.algorithms.kernels import kernel, literal
-from matbench.algorithms.parallel import over_rows
+from matbench.algorithms.parallel import over_views
 from matbench.scene import SAME_PLACE, Scene
 from matbench.space import DisparitySpace
 
@@ -28,12 +28,12 @@ def _between(pixels, weights, phase, fineness, row):  # type: ignore[no-untyped-
 
 
 @kernel
-def _sample_rows(image, weights, fine):  # type: ignore[no-untyped-def]
-    height, width, channels = image.shape
+def _sample_rows(image, weights, top, end, fine):  # type: ignore[no-untyped-def]
+    _, width, channels = image.shape
     fineness = np.uintp(weights.shape[0])
     pixels = np.empty(width + 2, np.float32)
     for c in range(channels):
-        for y in range(height):
+        for y in range(top, end):
             for x in range(width):
                 pixels[x + 1] = np.float32(image[y, x, c])
             pixels[0], pixels[width + 1] = pixels[1], pixels[width]
@@ -66,7 +66,7 @@ def fine_rows(images: NDArray[np.uint8], fineness: int, threads: int = 1) -> NDA
     taps = ((2 - t) * t - 1) * t / 2, ((3 * t - 5) * t * t + 2) / 2, ((4 - 3 * t) * t + 1) * t / 2, (t - 1) * t * t / 2
     weights = np.stack(taps, axis=1).astype(np.float32)
     fine = np.empty((n, channels, height, fineness * (width - 1) + 1), np.float32)
-    over_rows(lambda view, _: _sample_rows(images[view], weights, fine[view]), n, threads, 1)
+    over_views(lambda view, top, end: _sample_rows(images[view], weights, top, end, fine[view]), n, height, threads)
     return fine
 
 
@@ -95,14 +95,15 @@ def by_phase(
     kind = values.dtype if shift is None else np.uint16
     out = np.zeros((values.shape[0], fineness, *values.shape[1:-1], width + spare), kind)
 
-    def sort(view: int, _: int) -> None:
-        # one view at a time: whole numbers of all views would take as much memory again
-        one = values[view] if shift is None else whole(values[view : view + 1], shift)[0]  # type: ignore[arg-type]
+    def sort(view: int, top: int, end: int) -> None:
+        # some rows at a time: whole numbers of all views would take as much memory again
+        some = values[view : view + 1, ..., top:end, :]
+        one = (some if shift is None else whole(some, shift))[0]  # type: ignore[arg-type]
         for phase in range(fineness):
             part = one[..., phase::fineness]
-            out[view, phase, ..., : part.shape[-1]] = part
+            out[view, phase, ..., top:end, : part.shape[-1]] = part
 
-    over_rows(sort, len(values), threads, 1)
+    over_views(sort, len(values), values.shape[-2], threads)
     return out
 
 

@@ -165,8 +165,8 @@ class Matcher:
         chosen = scene.choose(indices)
         space = search_space(chosen, settings.fineness)
         rows = fine_rows(chosen.views, space.fineness, threads)
-        grey, form = luma(rows), settings.similarity
-        slopes = gradient(grey if form == "mixed" else grey[:, :0], space.fineness)
+        grey, form = luma(rows, threads), settings.similarity
+        slopes = gradient(grey if form == "mixed" else grey[:, :0], space.fineness, threads)
         slopes = strengthened(slopes, space.fineness, settings.texture, threads)
         bits = census(grey if form in ("census", "mixed") else grey[:, :0], space.fineness, threads)
         if not settings.colour:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from matbench.algorithms.parallel import over_rows, share
+from matbench.algorithms.parallel import over_rows, over_views, share
 
 
 @given(st.integers(0, 70), st.integers(1, 4), st.integers(1, 20))
@@ -15,6 +15,15 @@ def test_every_row_is_worked_on_once(rows, threads, block):
     over_rows(lambda first, end: calls.append((first, end)), rows, threads, block)
     assert sorted(row for first, end in calls for row in range(first, end)) == list(range(rows))
     assert all(0 < end - first <= block for first, end in calls)
+
+
+@given(st.integers(0, 9), st.integers(0, 70), st.integers(0, 4))
+def test_every_row_of_every_view_is_worked_on_once_and_each_thread_has_as_many_parts(views, rows, threads):
+    calls = []
+    over_views(lambda *part: calls.append(part), views, rows, threads)
+    done = sorted((view, row) for view, first, end in calls for row in range(first, end))
+    assert done == [(view, row) for view in range(views) for row in range(rows)]
+    assert rows < max(1, threads) ** 2 or len(calls) == views * max(1, threads)
 
 
 @given(st.integers(0, 5000), st.integers(0, 64))
