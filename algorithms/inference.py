@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from matbench.algorithms.fusion import Fusion
 from matbench.algorithms.mending import mend
 from matbench.algorithms.outlines import outlined
-from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.room import Room
 from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import Matcher, Matching
@@ -156,10 +155,9 @@ class Inference:
         scene, out = matcher.scene, np.empty_like(maps)
         pixels = np.float32(scene.pair_steps / matcher.space.fineness)
 
-        def shape(view: int, _: int) -> None:
-            found, image = maps[view] * pixels, scene.views[view]
-            smooth = smoothed(found, sure[view], image)
-            out[view] = outlined(smooth if mended else np.where(sure[view] > 0, smooth, found), image) / pixels
-
-        over_rows(shape, len(maps), threads, 1)
+        for view, image in enumerate(scene.views):
+            found = maps[view] * pixels
+            smooth = smoothed(found, sure[view], image, threads)
+            ends = outlined(smooth if mended else np.where(sure[view] > 0, smooth, found), image, threads)
+            np.divide(ends, pixels, out=out[view])
         return out
