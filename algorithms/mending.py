@@ -46,13 +46,14 @@ def count_votes(maps, view, tolerance, top, end, agreeing, contradicting):  # ty
 
 
 @kernel
-def classify(found, trusted, least, step):  # type: ignore[no-untyped-def]
-    """(H, W) int32 classes, `step` wide from `least` on, in which disparities lie; -1 where they are not trusted."""
-    places = np.empty(found.shape, np.int32)
-    for y in range(found.shape[0]):
+def classify(found, trusted, least, step, top, end, places):  # type: ignore[no-untyped-def]
+    """(H, W) int32 classes, `step` wide from `least` on, in which disparities lie; -1 where they are not trusted.
+
+    The rows top..end of `places` are overwritten.
+    """
+    for y in range(top, end):
         for x in range(found.shape[1]):
             places[y, x] = np.int32((found[y, x] - least) / step) if trusted[y, x] else -1
-    return places
 
 
 @kernel
@@ -114,6 +115,35 @@ def vote(found, image, doubtful, places, colour, distance, least, most, step, to
                     out[y, x] = median
 
 
+def _trusted(
+    maps: NDArray[np.float32], view: int, pixel: float, first: bool, threads: int
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """A view's map, without what is lost in the `first` round, and which of its pixels are trusted (`mend`)."""
+    found, shape = maps[view].copy(), maps.shape[1:]
+    agreeing, contradicting = np.empty(shape, np.int32), np.empty(shape, np.int32)
+    trusted = np.empty(shape, bool)
+
+    def count(top: int, end: int) -> None:
+        count_votes(maps, view, np.float32(pixel), top, end, agreeing, contradicting)
+        here, yes, no = found[top:end], agreeing[top:end], contradicting[top:end]
+        if first:
+            here[no > yes] = np.nan
+        trusted[top:end] = (no * TRUST <= yes) & ~np.isnan(here)
+
+    over_rows(count, shape[0], threads, 64)
+    return found, trusted
+
+
+def _filled(maps: NDArray[np.float32], threads: int) -> NDArray[np.float32]:
+    out = np.empty_like(maps)
+
+    def fill(view: int, _: int) -> None:
+        out[view] = fill_from_background(maps[view])
+
+    over_rows(fill, len(maps), threads, 1)
+    return out
+
+
 def mend(
     maps: NDArray[np.float32], images: NDArray[np.uint8], pixel: float, rounds: int, threads: int = 1
 ) -> NDArray[np.float32]:
@@ -142,22 +172,18 @@ def mend(
     for number in range(rounds):
         new = np.empty_like(maps)
         for view, image in enumerate(images):
-            agreeing, contradicting = np.empty(shape, np.int32), np.empty(shape, np.int32)
-
-            def count(top: int, end: int, view: int = view, maps: NDArray[np.float32] = maps) -> None:
-                count_votes(maps, view, np.float32(pixel), top, end, agreeing, contradicting)  # noqa: B023
-
-            over_rows(count, shape[0], threads, 64)
-            found = maps[view].copy()
-            if number == 0:
-                found[contradicting > agreeing] = np.nan
-            trusted = (contradicting * TRUST <= agreeing) & ~np.isnan(found)
+            found, trusted = _trusted(maps, view, pixel, number == 0, threads)
             if not trusted.any():
                 new[view] = maps[view]
                 continue
 
             least, most, step = np.float32(np.nanmin(found)), np.float32(np.nanmax(found)), np.float32(pixel / 2)
-            doubtful, places = ~trusted, classify(found, trusted, least, step)
+            doubtful, places = ~trusted, np.empty(shape, np.int32)
+
+            def place(top: int, end: int) -> None:
+                classify(found, trusted, least, step, top, end, places)  # noqa: B023
+
+            over_rows(place, shape[0], threads, 64)
 
             def ask(top: int, end: int, view: int = view) -> None:
                 vote(
@@ -165,5 +191,5 @@ def mend(
                 )  # fmt: skip
 
             over_rows(ask, shape[0], threads)
-        maps = np.stack([fill_from_background(found) for found in new])
-    return maps if rounds else np.stack([fill_from_background(found) for found in maps])
+        maps = _filled(new, threads)
+    return maps if rounds else _filled(maps, threads)

@@ -100,7 +100,9 @@ def test_vote_is_a_weighted_median(shape, step, share, seed):
     out = np.full(found.shape, 9, np.float32)
     for top, end in ((0, 1), (1, len(found))):
         least = np.float32(np.nanmin(found))
-        places = classify(found, trusted, least, np.float32(step))
+        places = np.full(found.shape, 99, np.int32)
+        classify(found, trusted, least, np.float32(step), 0, top, places)
+        classify(found, trusted, least, np.float32(step), top, len(found), places)
         vote(
             found, images[0], asked, places, colour, distance, least, np.nanmax(found), np.float32(step), top, end, out
         )
