@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from matbench.algorithms.fusion import Fusion
 from matbench.algorithms.mending import mend
 from matbench.algorithms.outlines import outlined
+from matbench.algorithms.parallel import over_rows
 from matbench.algorithms.room import Room
 from matbench.algorithms.semiglobal import SemiGlobal
 from matbench.algorithms.similarity import Matcher, Matching
@@ -135,14 +136,24 @@ class Inference:
                 energies[view] = [
                     self.semiglobal.energy(paid, image, of, paths.unit, threads) for of in (known[view], maps[view])
                 ]
-        steps = (maps + np.float32(space.first)) / np.float32(space.fineness)
+        first, q = np.float32(space.first), np.float32(space.fineness)
+        steps = np.empty_like(maps)
+
+        def in_steps(view: int, _: int) -> None:
+            steps[view] = (maps[view] + first) / q
+
+        over_rows(in_steps, space.views, threads, 1)
         mended = mend(steps, scene.views, 1 / scene.pair_steps, self.mending, threads)
-        planes = np.asarray(mended * np.float32(space.fineness) - np.float32(space.first), np.float32)
-        moved = ~(np.abs(mended - steps) <= 1 / scene.pair_steps)
-        if ratios is not None:
-            ratios[moved[scene.ref]] = 0
-        sure[moved[: len(sure)]] = 0
-        return planes, sure, energies
+
+        def in_planes(view: int, _: int) -> None:
+            maps[view] = mended[view] * q - first
+            moved = ~(np.abs(mended[view] - steps[view]) <= 1 / scene.pair_steps)
+            if ratios is not None and view == scene.ref:
+                ratios[moved] = 0
+            sure[view : view + 1, moved] = 0
+
+        over_rows(in_planes, space.views, threads, 1)
+        return maps, sure, energies
 
     @staticmethod
     def _on_surfaces(
