@@ -213,7 +213,9 @@ class Paths:
                     _sweep(turned, part, *steps, 0, forward, forward, 0, columns, walked, least, sums)
                 turn_volume(sums, total[top : top + len(band)], 1)
 
-        over_rows(along, rows, threads, BAND)
+        # as many bands for every thread
+        bands = -(-rows // (BAND * max(1, threads))) * max(1, threads)
+        over_rows(along, rows, threads, -(-rows // (bands * EACH)) * EACH)
         walked = room.empty("walked", (2, 3, 2, planes + 2, columns + 2), self.kind)
         least = room.empty("least", (2, 3, 2, columns + 2), self.kind)
         half = (rows + 1) // 2
