@@ -78,14 +78,17 @@ class Descent:
         now, before = mu, np.empty_like(mu)
         history: dict[str, list[float]] = {}
         last, momentum, beta, step = np.inf, 1.0, 0.0, self.step
-        made = 0
+        made, counts = 0, np.full((2, len(mu)), np.nan)
         while made < self.passes:
             made += 1
+            # where the next pass begins is known before this one: it follows from neither energy
+            *_, ahead, _ = follow(0.0, np.inf, momentum, beta, step, self.accelerated)
             if told is not None:
                 told.look(now, before, np.array(beta))
-            energies = energy.step(now, before, beta, step, before, None, self.threads)
+            energies = energy.step(now, before, beta, step, before, None, self.threads, counts, ahead)
             total = energies["total"]
             accepted, restart, momentum, beta, step = follow(total, last, momentum, beta, step, self.accelerated)
+            counts[0] = counts[1] if accepted else np.nan
             if not accepted:
                 continue
             energies["restart"] = float(restart)
@@ -107,7 +110,7 @@ class Descent:
         states["data"], states["momentum"], states["step"] = np.inf, 1, self.step
         at_once = 1 if told is not None else self.passes
         history: dict[str, list[float]] = {}
-        terms, counting = energy.terms(kind), Count(energy.pressure * (1 / energy.scale) / 2, energy.target, 0.0)
+        terms, counting = energy.terms(kind), Count(energy.pressure * (1 / energy.scale) / 2, energy.target, 0.0, -1.0)
         for first in range(0, self.passes, max(1, at_once)):
             if states["stopped"].all():
                 break

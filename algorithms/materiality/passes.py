@@ -88,11 +88,19 @@ class Ties(NamedTuple):
 
 
 class Count(NamedTuple):
-    """The count term's part of the slope of every point in a row: pressure (sum of mu - target) + bias."""
+    """The count term's part of the slope of every point in a row: pressure (sum of mu - target) + bias.
+
+    Parameters
+    ----------
+    ahead
+        The beta of the pass after this one: `pass_rows` adds up where that one will begin, while it is in the cache.
+        Below 0 nothing is added up.
+    """
 
     pressure: float
     target: float
     bias: float
+    ahead: float
 
 
 class Room(NamedTuple):
@@ -137,19 +145,19 @@ class Room(NamedTuple):
 
 @helper
 def _extrapolate(now, before, beta, out):  # type: ignore[no-untyped-def]
-    """out = now + beta (now - before), kept within [0, 1]. Returns its sum."""
+    """out = now + beta (now - before), kept within [0, 1]. Returns its sum, as exact as energies of a plane."""
     zero, one = now.dtype.type(0), now.dtype.type(1)
-    total = 0.0
+    total = zero
     if beta == zero:  # at the start there is no pass before: what stands there may be anything
         for x in range(now.size):
             out[x] = now[x]
-            total += np.float64(now[x])
+            total += now[x]
     else:
         for x in range(now.size):
             value = min(max(now[x] + beta * (now[x] - before[x]), zero), one)
             out[x] = value
-            total += np.float64(value)
-    return total
+            total += value
+    return np.float64(total)
 
 
 @helper
@@ -267,7 +275,8 @@ def pass_rows(point, data, pairs, ties, count, beyond, step, top, end, room, new
     slopes
         The same shape, overwritten with the slopes, in the same units; or None.
     sums
-        (rows, 3), overwritten: E_data, the ties' E_smooth and the sum of mu of each row.
+        (rows, 4), overwritten: E_data, the ties' E_smooth and the sum of mu of each row, and that of the next pass's
+        point if it is added up (`Count`).
     """
     rows, planes, columns = point.now.shape
     kind = point.now.dtype.type
@@ -283,7 +292,7 @@ def pass_rows(point, data, pairs, ties, count, beyond, step, top, end, room, new
                 _extrapolate_row(beyond[int(row > y)], beyond[0], zero, ring[row % 3])
         above, here, below = ring[max(0, y - 1) % 3], ring[y % 3], ring[min(rows - 1, y + 1) % 3]
         offset = kind(count.pressure * (sums[y, 2] - count.target) + count.bias)
-        energies = 0.0, 0.0
+        energies, total = (0.0, 0.0), 0.0
         for i in range(data.views):
             fill(zero, behind[i])
         # `here` has a column more at either end
@@ -297,4 +306,7 @@ def pass_rows(point, data, pairs, ties, count, beyond, step, top, end, room, new
                     y, k, above, here, below, rays, data, pairs.any_views, pairs.links, pairs.rest, ties.weights,
                     ties, room, step, offset, new, slopes, energies,
                 )  # fmt: skip
+                if count.ahead >= 0:
+                    total += _extrapolate(new[y, k], point.now[y, k], kind(count.ahead), room.line[0])
         sums[y, 0], sums[y, 1] = energies
+        sums[y, 3] = total

@@ -86,7 +86,7 @@ def descend_rows(  # type: ignore[no-untyped-def]
     """
     kind, unit = now.dtype.type, np.float64(data.full)
     weight = count.pressure / unit  # lambda / N, as the pressure is full / 2 of the derivative
-    sums = np.empty((1, 3))
+    sums = np.empty((1, 4))
     for y in range(top, end):
         state, a, b = states[y], now[y : y + 1], before[y : y + 1]
         data_here, ties_here = _data_of(data, y), _ties_of(ties, ties.weights, y)

@@ -4,6 +4,7 @@ from functools import cached_property
 
 import numpy as np
 from attrs import field, frozen
+from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import fill, helper, kernel
 from matbench.algorithms.materiality.energy import descend, see_row
@@ -147,10 +148,21 @@ class SharpEnergy(Energy):
         return False
 
     def step(
-        self, now: Floats, before: Floats, beta: float, step: float, new: Floats, slopes: Floats | None, threads: int
+        self,
+        now: Floats,
+        before: Floats,
+        beta: float,
+        step: float,
+        new: Floats,
+        slopes: Floats | None,
+        threads: int,
+        counts: NDArray[np.float64] | None = None,
+        ahead: float = 0.0,  # noqa: ARG002
     ) -> dict[str, float]:
-        """As `Energy.step`."""
+        """As `Energy.step`, but `counts` stay unknown."""
         space, kind = self.space, now.dtype.type
+        if counts is not None:
+            counts[1] = np.nan
         if beta and not self.scratch:
             self.scratch.append(np.empty_like(now))  # kept: fresh memory is slow
         at, held = self.scratch[0] if beta else now, np.empty(space.rows)

@@ -50,3 +50,29 @@ def test_whole_energy_and_its_gradient(space, which, per_row, seed):
         high[point] += 1e-3
         low[point] -= 1e-3
         assert slopes[point] == pytest.approx((sum(twin(high)) - sum(twin(low))) / 2e-3, abs=1e-7)
+
+
+@settings(max_examples=15, deadline=None)
+@given(SPACES, PAIR_SETS, st.booleans(), st.sampled_from([0.0, 0.7]), st.integers(0, 999))
+def test_what_the_next_pass_counts_is_added_up_by_the_pass_before(space, which, per_row, ahead, seed):
+    which = pairs(space.views, which, space.views // 2)
+    rng = np.random.default_rng(seed)
+    rows = [random_row(space, which, seed + y) for y in range(space.rows)]
+    mu, rho = (np.stack(part) for part in zip(*rows, strict=True))
+    none = np.zeros((space.rows, 0, 0), np.uint8)
+    energy = Energy(space, which, rho, 3.0, 0.3, per_row, 0.0, 0.0, (none, none), 1.0)
+    before, found = rng.random(mu.shape), {}
+    for threads in (1, 2):
+        counts, new = np.full((2, space.rows), np.nan), before.copy()
+        alone = energy.step(mu, before, 0.4, 0.05, np.empty_like(mu), None, threads)
+        assert energy.step(mu, new, 0.4, 0.05, new, None, threads, counts, ahead) == alone
+        point = np.clip(new + ahead * (new - mu), 0, 1)
+        np.testing.assert_allclose(counts[1], point.sum(axis=(1, 2)), rtol=1e-12)
+        # the next pass is the same with and without
+        plain, told = np.empty_like(mu), np.empty_like(mu)
+        expected = energy.step(new, mu, ahead, 0.05, plain, None, threads)
+        counts[0] = counts[1]
+        assert energy.step(new, mu, ahead, 0.05, told, None, threads, counts) == pytest.approx(expected, rel=1e-12)
+        np.testing.assert_allclose(told, plain, rtol=1e-12, atol=1e-14)
+        found[threads] = told
+    np.testing.assert_array_equal(found[1], found[2])
