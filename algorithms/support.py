@@ -13,7 +13,7 @@ from matbench.algorithms.paths import round_costs
 from matbench.algorithms.room import Room
 from matbench.algorithms.similarity import Matcher
 
-AT_ONCE = 16  # rows: what is found of them stays in the cache until it is used
+AT_ONCE = 8  # rows: what is found of them stays in the cache until it is used
 SHARES = 4  # parts that each thread takes of the rows: their first and last rows are found by two
 
 

@@ -114,8 +114,8 @@ def energy(views: int, tied: bool) -> Kernel:
     name = f"energy, {views} views" + (", ties" if tied else "")
     # V 2, A and its part of the slope 5 a view; residual, its square, two pulls and two slopes 10 a pair; the step 6
     operations = 7 * views + 10 * (views - 1) + 6 + 10 * tied
-    # mu twice, one of them written and so read before; a byte a pair, two for the ties; the count reads mu once more
-    return Kernel(name, best(work), PASSES * mu.size, operations, 32, 16 + (views - 1) + 2 * tied + 4)
+    # mu read, and the next one written and so read before; a byte a pair, two for the ties
+    return Kernel(name, best(work), PASSES * mu.size, operations, 32, 12 + (views - 1) + 2 * tied)
 
 
 def similarities(form: Form, window: int) -> Kernel:
