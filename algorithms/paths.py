@@ -146,6 +146,12 @@ def _units(top: float, table: NDArray[np.float32]) -> tuple[type[np.uint16 | np.
     return np.uint32, min(large, (1 << 23) / top) if top else large
 
 
+def _band(rows: int, threads: int) -> int:
+    """How many rows are turned at a time: about `BAND`, and as many bands for every thread."""
+    bands = -(-rows // (BAND * max(1, threads))) * max(1, threads)
+    return -(-rows // (bands * EACH)) * EACH
+
+
 @frozen(eq=False)
 class Paths:
     """How costs are counted in whole numbers and what steps of a path cost.
@@ -181,7 +187,7 @@ class Paths:
     def held(self, shape: tuple[int, ...]) -> int:
         """Bytes of costs in whole numbers and their sums, on one thread, for (H, planes, W)."""
         rows, planes, columns = self.wide(shape)
-        return 2 * np.dtype(self.kind).itemsize * (rows + min(rows, BAND)) * planes * columns
+        return 2 * np.dtype(self.kind).itemsize * (rows + min(rows, _band(shape[0], 1))) * planes * columns
 
     def whole(self, cost: NDArray[np.float32], room: Room, threads: int = 1) -> NDArray[Any]:
         """(H, planes, W) costs in whole units, 0 where they are unknown (NaN); `wide`, with anything beyond."""
@@ -213,9 +219,7 @@ class Paths:
                     _sweep(turned, part, *steps, 0, forward, forward, 0, columns, walked, least, sums)
                 turn_volume(sums, total[top : top + len(band)], 1)
 
-        # as many bands for every thread
-        bands = -(-rows // (BAND * max(1, threads))) * max(1, threads)
-        over_rows(along, rows, threads, -(-rows // (bands * EACH)) * EACH)
+        over_rows(along, rows, threads, _band(rows, threads))
         walked = room.empty("walked", (2, 3, 2, planes + 2, columns + 2), self.kind)
         least = room.empty("least", (2, 3, 2, columns + 2), self.kind)
         half = (rows + 1) // 2

@@ -42,7 +42,7 @@ class Materiality:
     end; V and mu follow from that. Then all maps are inferred again, with costs from the views that see each
     point. A pass seeks the maps of least energy (`SemiGlobal.energy`) under the costs of that pass. The history
     holds it as ``energy_before`` and ``energy``, with the share of pixels that ``changed``. Semi-global matching
-    only approximates the minimum, so a pass may end up to 2 % above where it began.
+    only approximates the minimum, so a pass may end up to 3 % above where it began.
     Numbers are those of the equations in docs/concepts/materiality.md.
 
     Its parameters are in four groups, but are given by their own names: ``Materiality(pairs="all", passes=2)``. A

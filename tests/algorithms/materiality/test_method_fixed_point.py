@@ -83,7 +83,7 @@ def test_a_pass_lowers_the_energy_of_its_costs(name, noise):
         before, after = np.array(history["energy_before"]), np.array(history["energy"])
         # without noise mended maps may be as good as those of least energy
         assert surfaces or noise == "0" or after[0] < before[0]
-        assert (after <= 1.02 * before).all(), "as the docstring says"
+        assert (after <= 1.03 * before).all(), "as the docstring says"
 
 
 def test_visibilities_open_before_the_map_and_close_behind_it():
