@@ -95,7 +95,7 @@ class Matching:
     window: int = field(default=3, validator=odd)
     sigma: float = field(default=9.0, validator=validators.gt(0))
     truncation: float = field(default=20.0, validator=validators.ge(0))
-    texture: float = field(default=6.0, validator=validators.ge(0))
+    texture: float = field(default=6.0, validator=[validators.ge(0), validators.le(255)])
     colour: bool = True
     alike: float = field(default=10.0, validator=validators.ge(0))
 

@@ -61,7 +61,7 @@ def room() -> int:
     """
     told = os.environ.get(VARIABLE, "") or str(DEFAULT_MB)
     if not re.fullmatch("[0-9]{1,9}", told):
-        raise UserError(f"{VARIABLE} is {told!r}: it must be a whole number of MiB; 0 keeps no computed scenes")
+        raise UserError(f"{VARIABLE} is {told!r}: it must be a whole number of MiB below 10^9; 0 keeps no scenes")
     return int(told) << 20
 
 
@@ -115,7 +115,9 @@ def scene(name: str | None, make: Callable[[], Scene]) -> Scene:
         return _read(place, name, most // _SHARE)
     made = make()
     with suppress(OSError, ValueError, MemoryError):
-        _write(place, packed(made, name), most)
+        # the larger part of its bytes, before they are put together
+        if made.views.nbytes + sum(truth.nbytes for truth in made.truth.values()) <= most // _SHARE:
+            _write(place, packed(made, name), most)
     return made
 
 

@@ -15,6 +15,10 @@ from matbench.files.temporary import temporary_folder
 
 _NEWNS, _NEWUSER = 0x00020000, 0x10000000  # unshare(2)
 _RDONLY, _NOSUID, _NODEV, _REMOUNT, _BIND, _REC, _PRIVATE = 1, 2, 4, 32, 4096, 16384, 1 << 18  # mount(2)
+_CAPABILITIES, _NO_NEW_PRIVILEGES = 0x20080522, 38
+# CAP_DAC_READ_SEARCH (files by handle), SYS_MODULE, SYS_RAWIO, SYS_CHROOT, SYS_PTRACE (another's root folder),
+# SYS_ADMIN (mounts), SYS_BOOT, MKNOD (disks), PERFMON, BPF, CHECKPOINT_RESTORE
+_GIVEN_UP = (2, 16, 17, 18, 19, 21, 22, 27, 38, 39, 40)
 UNCONFINED = "MATBENCH_UNCONFINED"
 SHARED_MEMORY = "/dev/shm"  # noqa: S108 -- POSIX's name for it
 
@@ -23,7 +27,7 @@ def shut_in(read_only: Path, shared_mb: int, hidden: Path | None = None) -> bool
     """Let this process, and all that it starts, read a folder but not write to it; whether that worked.
 
     Shared memory becomes one of its own, of `shared_mb` MiB at most, which is gone when the last of them ends: what a
-    method leaves there harms nobody.
+    method leaves there harms nobody. Then the rights by which all this could be undone are given up for good.
 
     Parameters
     ----------
@@ -59,7 +63,32 @@ def shut_in(read_only: Path, shared_mb: int, hidden: Path | None = None) -> bool
         return False
     # last: the folder above may hold it, and would be bound without what is mounted in it
     flags = _NOSUID | _NODEV | _RDONLY
-    return covered is None or mount(b"tmpfs", covered, b"tmpfs", flags, b"mode=0500")
+    if not (covered is None or mount(b"tmpfs", covered, b"tmpfs", flags, b"mode=0500")):
+        return False
+    return _rights_given_up(libc)
+
+
+class _Header(ctypes.Structure):
+    _fields_ = (("version", ctypes.c_uint32), ("pid", ctypes.c_int))
+
+
+def _rights_given_up(libc: ctypes.CDLL) -> bool:
+    """Give up all capabilities that reach beyond a mount namespace, also for what is started; whether that worked.
+
+    Root keeps the others, such as to read the files of other users. (capabilities(7), prctl(2))
+    """
+    # effective, permitted and inheritable ones up to 31, and then those above
+    header, sets = _Header(_CAPABILITIES, 0), (ctypes.c_uint32 * 6)()
+    if libc.capget(ctypes.byref(header), sets):
+        return False
+    given_up = sum(1 << number for number in _GIVEN_UP)
+    for place, word in enumerate(sets):
+        sets[place] = word & ~(given_up >> 32 * (place // 3)) & 0xFFFFFFFF
+    # else root would get them back with the next program that is started
+    none = ctypes.c_ulong(0)
+    if libc.prctl(_NO_NEW_PRIVILEGES, ctypes.c_ulong(1), none, none, none):
+        return False
+    return bool(libc.capset(ctypes.byref(header), sets) == 0)
 
 
 @cache

@@ -77,7 +77,7 @@ def test_what_is_no_number_is_told_in_one_line(
     status, _, said = run(capsys, "scene", "show", SMALL)
     assert status == 2
     assert said.splitlines() == [
-        f"matbench: MATBENCH_CACHE_MB is {told!r}: it must be a whole number of MiB; 0 keeps no computed scenes"
+        f"matbench: MATBENCH_CACHE_MB is {told!r}: it must be a whole number of MiB below 10^9; 0 keeps no scenes"
     ]
 
 

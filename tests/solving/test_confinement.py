@@ -1,12 +1,15 @@
 """What a process that runs methods can reach."""
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from forking import beside, in_child
 
+from matbench.files.temporary import temporary_folder
 from matbench.solving import confinement
 from matbench.solving.confinement import SHARED_MEMORY, shared_memory_mb, shut_in
 
@@ -96,6 +99,51 @@ def test_what_is_hidden_is_empty_and_stays_so(name: str, tmp_path: Path) -> None
     seen = every - {f"{'kept' if name == 'link' else name}/truth"}
     assert in_child(inside) == [*sorted(seen), "Read-only file system"]
     assert (hidden / "later").read_text() == "secret", "others see what is there"
+
+
+UNDO = """
+import ctypes, os, sys
+libc = ctypes.CDLL(None, use_errno=True)
+def undone(run, hidden):
+    ways = {
+        "cover taken off": lambda: libc.umount2(os.fsencode(hidden), 2) == 0,
+        "run folder let go": lambda: libc.umount2(os.fsencode(run), 2) == 0,
+        "written again": lambda: libc.mount(None, os.fsencode(run), None, ctypes.c_ulong(4096 | 32), None) == 0,
+        "seen through another": lambda: os.path.exists(f"/proc/{os.getppid()}/root{hidden}/truth"),
+    }
+    before = [way for way in ways if ways[way]()]
+    libc.unshare(0x10000000 | 0x00020000)  # into namespaces of its own, where it has all rights
+    return before + [way for way in ways if ways[way]()]
+if __name__ == "__main__":
+    print(undone(*sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("is_program", [False, True])
+@pytest.mark.parametrize("user", [0, 65534])
+def test_what_is_shut_in_stays_so(user: int, is_program: bool) -> None:
+    """Neither the process itself nor a program that it starts can undo it, whoever it belongs to."""
+    if os.getuid() and user != os.getuid():
+        pytest.skip("only root becomes another user")
+    with temporary_folder() as place:
+        Path(place).chmod(0o777)
+        run, hidden = str(Path(place, "run")), str(Path(place, "kept"))
+        for folder in (run, hidden):
+            Path(folder).mkdir()
+        Path(hidden, "truth").write_text("secret")
+
+        def inside() -> object:
+            os.setuid(user)
+            assert shut_in(Path(run), 10, Path(hidden))
+            if is_program and os.access(sys.executable, os.X_OK):
+                line = [sys.executable, "-c", UNDO, run, hidden]
+                found: object = subprocess.run(line, check=True, capture_output=True, text=True).stdout
+            else:
+                exec(UNDO, here := {"__name__": "undo"})  # noqa: S102 -- what stands above
+                found = f"{here['undone'](run, hidden)}\n"
+            return [found, os.listdir(hidden)]  # noqa: PTH208
+
+        assert in_child(inside) == ["[]\n", []]
 
 
 def test_what_cannot_be_made_need_not_be_hidden(tmp_path: Path) -> None:
