@@ -166,9 +166,10 @@ class Inference:
         scene, out = matcher.scene, np.empty_like(maps)
         pixels = np.float32(scene.pair_steps / matcher.space.fineness)
 
-        for view, image in enumerate(scene.views):
-            found = maps[view] * pixels
-            smooth = smoothed(found, sure[view], image, threads)
-            ends = outlined(smooth if mended else np.where(sure[view] > 0, smooth, found), image, threads)
-            np.divide(ends, pixels, out=out[view])
+        def shape(view: int, _: int) -> None:
+            found, image = maps[view] * pixels, scene.views[view]
+            smooth = smoothed(found, sure[view], image)
+            out[view] = outlined(smooth if mended else np.where(sure[view] > 0, smooth, found), image) / pixels
+
+        over_rows(shape, len(maps), threads, 1)
         return out

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import kernel
-from matbench.algorithms.parallel import over_rows
 
 JUMP = 2.0  # pixels of disparity by which a near surface stands out
 SAME = 1.5  # pixels of disparity within which neighbours are one surface
@@ -35,7 +34,7 @@ def _outline(found, image, out):  # type: ignore[no-untyped-def]
                     out[y, x] = min(out[y, x], far)
 
 
-def outlined(found: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1) -> NDArray[np.float32]:
+def outlined(found: NDArray[np.float32], image: NDArray[np.uint8]) -> NDArray[np.float32]:
     """(H, W) a map whose near surfaces end where less than half of a pixel is theirs.
 
     The last pixel of a near surface in a row shows some of what is behind, too. That mixture moves with the edge, so
@@ -54,5 +53,5 @@ def outlined(found: NDArray[np.float32], image: NDArray[np.uint8], threads: int 
         (H, W, 3) uint8.
     """
     out = np.empty_like(found)
-    over_rows(lambda top, end: _outline(found[top:end], image[top:end], out[top:end]), len(found), threads)
+    _outline(found, image, out)
     return out

@@ -1,12 +1,9 @@
 """Smooth surfaces through a map: where a pixel is unsure, a plane through surer pixels of its colour takes over."""
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
 from matbench.algorithms.kernels import helper, kernel
-from matbench.algorithms.parallel import over_rows
 
 REACH = 50.0  # pixels of a path over which a neighbour's weight falls to 1/e; half of it in the second round
 COLOUR = 5.0  # grey levels, added up along a path, over which it falls to 1/e
@@ -95,15 +92,12 @@ def _walk(sums, links, behind, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def along_columns(sums, links, first, end):  # type: ignore[no-untyped-def]
-    """Sums along columns take the place of `sums` (H, 9, W), each as seen from its own pixel; `links` are (H, W).
-
-    Columns `first` to `end` are walked.
-    """
-    height = sums.shape[0]
+def along_columns(sums, links):  # type: ignore[no-untyped-def]
+    """Sums along columns take the place of `sums` (H, 9, W), each as seen from its own pixel; `links` are (H, W)."""
+    height, _, width = sums.shape
     summed, behind = np.empty((height, PARTS, BAND), np.float32), np.empty((2, PARTS, BAND), np.float32)
-    for left in range(first, end, BAND):
-        lines = slice(left, min(left + BAND, end))
+    for left in range(0, width, BAND):
+        lines = slice(left, min(left + BAND, width))
         count = lines.stop - left
         _walk(sums[:, :, lines], links[:, lines], behind[:, :, :count], summed[:, :, :count])
         for row in range(height):
@@ -112,13 +106,13 @@ def along_columns(sums, links, first, end):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def along_rows(sums, links, first, end):  # type: ignore[no-untyped-def]
-    """The same along the rows `first` to `end`, some of which are turned into columns at a time; `links` are (W, H)."""
-    width = sums.shape[2]
+def along_rows(sums, links):  # type: ignore[no-untyped-def]
+    """The same along the rows, some of which are turned into columns at a time; `links` are (W, H)."""
+    height, _, width = sums.shape
     turned, summed = np.empty((width, PARTS, BAND), np.float32), np.empty((width, PARTS, BAND), np.float32)
     behind = np.empty((2, PARTS, BAND), np.float32)
-    for top in range(first, end, BAND):
-        count = min(BAND, end - top)
+    for top in range(0, height, BAND):
+        count = min(BAND, height - top)
         for c in range(PARTS):
             for x in range(width):
                 for line in range(count):
@@ -160,26 +154,19 @@ def _link(image, found, fall, y, x, v, u):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def link(image, found, fall, top, end, along, down):  # type: ignore[no-untyped-def]
+def link(image, found, fall, along, down):  # type: ignore[no-untyped-def]
     """Weight of a step from the pixel before: in a row (`along`, (W, H)), and in a column (`down`, (H, W)).
 
-    `fall` has the weights by contrast, the largest difference over the colours; a jump makes them less. Rows `top` to
-    `end` are overwritten.
+    `fall` has the weights by contrast, the largest difference over the colours; a jump makes them less.
     """
-    for y in range(top, end):
-        for x in range(found.shape[1]):
+    height, width = found.shape
+    for y in range(height):
+        for x in range(width):
             along[x, y] = _link(image, found, fall, y, x, y, x - 1) if x > 0 else np.float32(0)
             down[y, x] = _link(image, found, fall, y, x, y - 1, x) if y > 0 else np.float32(0)
 
 
-def _block(lines: int, threads: int) -> int:
-    """As many whole bands for every thread."""
-    return -(-lines // (BAND * max(1, threads))) * BAND
-
-
-def fitted(
-    found: NDArray[np.float32], sure: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1
-) -> NDArray[np.float32]:
+def fitted(found: NDArray[np.float32], sure: NDArray[np.float32], image: NDArray[np.uint8]) -> NDArray[np.float32]:
     """(H, W) what planes through the neighbours of every pixel say of it.
 
     A neighbour weighs as much as it is sure, and the less the longer the path to it is and the more the colours change
@@ -196,27 +183,19 @@ def fitted(
         (H, W, 3) uint8.
     """
     along, down = np.empty(found.T.shape, np.float32), np.empty(found.shape, np.float32)
-    fall, (height, width) = np.exp(-np.arange(256) / COLOUR).astype(np.float32), found.shape
-    sums, plane = np.empty((height, PARTS, width), np.float32), np.empty_like(found)
-
-    def begin(top: int, end: int) -> None:
-        link(image, found, fall, top, end, along, down)
-        sums[top:end] = 0
-        sums[top:end, ONE], sums[top:end, D] = sure[top:end], sure[top:end] * found[top:end]
-
-    over_rows(begin, height, threads, BAND)
+    link(image, found, np.exp(-np.arange(256) / COLOUR).astype(np.float32), along, down)
+    sums = np.zeros((len(found), PARTS, found.shape[1]), np.float32)
+    sums[:, ONE], sums[:, D] = sure, sure * found
     for number in range(ROUNDS):
         length = np.float32(np.exp(-(2**number) / REACH))
-        rows, columns = along * length, down * length
-        over_rows(partial(along_rows, sums, rows), height, threads, _block(height, threads))
-        over_rows(partial(along_columns, sums, columns), width, threads, _block(width, threads))
-    over_rows(lambda top, end: planes_at(sums[top:end], plane[top:end]), height, threads)
+        along_rows(sums, along * length)
+        along_columns(sums, down * length)
+    plane = np.empty_like(found)
+    planes_at(sums, plane)
     return plane
 
 
-def smoothed(
-    found: NDArray[np.float32], sure: NDArray[np.float32], image: NDArray[np.uint8], threads: int = 1
-) -> NDArray[np.float32]:
+def smoothed(found: NDArray[np.float32], sure: NDArray[np.float32], image: NDArray[np.uint8]) -> NDArray[np.float32]:
     """(H, W) a map in which unsure pixels lie on the planes that surer ones of their colour span (`fitted`).
 
     Where texture is weak, semi-global matching makes steps of what is slanted: a step costs the same however large it
@@ -236,14 +215,8 @@ def smoothed(
         (H, W, 3) uint8.
     """
     known = np.nan_to_num(sure)
-    plane = fitted(found, known + np.float32(LEAST), image, threads)
-    out, least, most = np.empty_like(found), found.min(), found.max()
-
-    def put(top: int, end: int) -> None:
-        here, there = found[top:end], plane[top:end]
-        own = np.minimum(1, known[top:end] / np.float32(SURE)) ** 2
-        between = np.clip(there + own * (here - there), least, most)
-        out[top:end] = np.where(np.abs(here - there) < NEAR, between, here)
-
-    over_rows(put, len(found), threads, BAND)
-    return out
+    plane = fitted(found, known + np.float32(LEAST), image)
+    own = np.minimum(1, known / np.float32(SURE)) ** 2
+    near = np.abs(found - plane) < NEAR
+    between = np.clip(plane + own * (found - plane), found.min(), found.max())
+    return np.where(near, between, found).astype(np.float32)

@@ -75,9 +75,3 @@ def test_a_slope_is_no_outline():
 def test_maps_smaller_than_what_is_asked(shape):
     found = np.ones(shape, np.float32)
     np.testing.assert_array_equal(outlined(found, np.zeros((*shape, 3), np.uint8)), found)
-
-
-def test_threads_change_nothing():
-    found, image = edge(0.2)
-    found, image = np.tile(found, (40, 1)), np.tile(image, (40, 1, 1))
-    np.testing.assert_array_equal(outlined(found, image, 2), outlined(found, image))

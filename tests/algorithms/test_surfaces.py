@@ -73,13 +73,6 @@ def test_planes_are_those_of_a_regression_at_every_pixel(seed: int) -> None:
     assert np.abs(fitted(found, sure, image) - slow_fit(found, sure, image)).max() < 2e-4
 
 
-@pytest.mark.parametrize("shape", [(9, 150), (150, 9), (70, 140)])
-def test_threads_change_nothing(shape: tuple[int, int]) -> None:
-    found, sure, image = some(4, shape)
-    np.testing.assert_array_equal(smoothed(found, sure, image, 2), smoothed(found, sure, image))
-    np.testing.assert_array_equal(smoothed(found, sure, image, 3), smoothed(found, sure, image))
-
-
 def test_steps_become_the_slope_that_they_stand_for() -> None:
     slope = np.broadcast_to(np.arange(40) * 0.15, (24, 40)).astype(np.float32)
     steps = np.round(slope / 2) * np.float32(2)
