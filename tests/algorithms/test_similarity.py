@@ -121,6 +121,10 @@ def test_fewer_views_rescale_the_answer():
     [
         ("views", 1),
         ("fineness", -1),
+        ("texture", -1.0),
+        ("texture", 1e38),
+        ("texture", float("inf")),
+        ("texture", float("nan")),
         ("pairs", "some"),
         ("similarity", "ncc"),
         ("window", 4),
