@@ -44,30 +44,33 @@ def gradient(grey: NDArray[np.float32], fineness: int, threads: int = 1) -> NDAr
 
 
 def strengthened(slopes: NDArray[np.float32], fineness: int, texture: float, threads: int = 1) -> NDArray[np.float32]:
-    """Slopes in which weak texture says as much as strong: times texture / (s + 0.2), where that is more than 1.
+    """(views, H, samples) slopes times texture / (s + 0.2), where that is more than 1: at most 160 grey levels.
 
-    s is the root mean square of the slopes in the 5x5 pixels around, those beyond an edge mirrored. Shading by
-    texture that is hardly to be seen is often all that a wall shows. So differences of slopes are measured by what is
-    usual there, as correlation does that is normalised by the local contrast, but strong texture stays as it is.
+    s is the root mean square of the slopes in the 5x5 pixels around, those beyond an edge mirrored. Often a wall shows
+    no texture but one that is hardly visible. So weak slopes are measured by what is usual around them, as by a
+    correlation that is normalised by the local contrast. Strong ones stay as they are.
 
     Parameters
     ----------
     slopes
-        (views, H, samples) from `gradient`.
+        (views, H, samples) grey levels for each pixel, from `gradient`.
+    fineness
+        Samples from pixel to pixel.
     texture
         Grey levels; 0 leaves all slopes as they are.
     """
-    out = slopes.copy()
+    if not (slopes.size and texture):
+        return slopes
+    out = np.empty_like(slopes)
     window = 2 * AROUND * fineness + 1, 2 * AROUND + 1
 
     def strengthen(view: int, _: int) -> None:
         mean = cv2.blur(slopes[view] * slopes[view], window, borderType=cv2.BORDER_REFLECT)
         usual = np.sqrt(np.maximum(mean, 0)) + np.float32(WEAKEST)
-        out[view] *= np.maximum(np.float32(texture) / usual, np.float32(1))
+        np.multiply(slopes[view], np.maximum(np.float32(texture) / usual, np.float32(1)), out=out[view])
         np.clip(out[view], -SHIFTS[1], SHIFTS[1], out=out[view])
 
-    if slopes.size and texture:
-        over_rows(strengthen, len(out), threads, 1)
+    over_rows(strengthen, len(out), threads, 1)
     return out
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from gapped_costs import costs_and_image
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -32,21 +33,12 @@ def twin(cost, image, small, table):
     return total
 
 
-@st.composite
-def problems(draw):
-    shape = tuple(draw(st.integers(1, top)) for top in (9, 7, 9))
-    rng = np.random.default_rng(draw(st.integers(0, 999)))
-    cost = rng.random(shape, np.float32)
-    cost[rng.random(shape) < draw(st.sampled_from([0, 0.2, 0.9]))] = np.nan
-    return cost, rng.integers(0, 60, (*shape[::2], 3), dtype=np.uint8)
-
-
 STEPS = [(0.1, 0.6), (0.5, 3.0), (0.5, 0.1), (0.0, 0.0), (0.1, 50.0), (70.0, 2.0)]
 
 
 @settings(max_examples=40, deadline=None)
 @given(
-    problems(),
+    costs_and_image(rows=9),
     st.sampled_from(STEPS),
     st.sampled_from([1.0, 0.0, 3e-4, 2e5]),
     st.sampled_from([4, 128]),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from gapped_costs import costs_and_image
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -25,17 +26,8 @@ def twin_winner(total, cost):
     return found
 
 
-@st.composite
-def problems(draw):
-    shape = tuple(draw(st.integers(1, top)) for top in (6, 7, 9))
-    rng = np.random.default_rng(draw(st.integers(0, 999)))
-    cost = rng.random(shape, np.float32)
-    cost[rng.random(shape) < draw(st.sampled_from([0, 0.2, 0.9]))] = np.nan
-    return cost, rng.integers(0, 60, (*shape[::2], 3), dtype=np.uint8)
-
-
 @settings(max_examples=40, deadline=None)
-@given(problems(), st.integers(2, 60), st.integers(0, 999))
+@given(costs_and_image(rows=6), st.integers(2, 60), st.integers(0, 999))
 def test_the_winner_is_its_twin(problem, most, seed):
     cost, _ = problem
     total = np.random.default_rng(seed).integers(0, most, cost.shape).astype(np.uint16)
@@ -67,7 +59,7 @@ def twin_energy(cost, image, planes, small, large, edge):
 
 
 @settings(deadline=None, max_examples=30)
-@given(problem=problems(), seed=st.integers(0, 99))
+@given(problem=costs_and_image(rows=6), seed=st.integers(0, 99))
 def test_energy_is_its_twin(problem, seed):
     cost, image = problem
     semiglobal, rng = SemiGlobal(small_step=0.1, large_step=0.7, contrast=20.0), np.random.default_rng(seed)
